@@ -55,6 +55,13 @@ def serve(
         help="TOPIC:TYPE=SOURCE of a sensor of the robot, with its source in CONFIG; may be repeated.",
     ),
     stamped: bool = typer.Option(False, "--stamped", help="Publish /cmd_vel as TwistStamped."),
+    max_silence: float = typer.Option(
+        0.0,
+        "--max-silence",
+        min=0.0,
+        help="Time without odometry, transforms or a sensor at which a robot that is a client stops, in s; "
+        "0 = command_timeout.",
+    ),
     keep_goals: bool = typer.Option(
         False, "--keep-goals", help="A goal goes on when its client is gone; else it is canceled."
     ),
@@ -75,7 +82,7 @@ def serve(
         if robot_only and _is_navigation(Path(what)):
             raise ValueError("--robot-only is of scenarios; the robot of a navigation file is a client itself")
         with waiting("reading the configuration") as on_step:
-            session, robot = _open(what, backend or None, seed if seed >= 0 else None, on_step)
+            session, robot = _open(what, backend or None, seed if seed >= 0 else None, max_silence, on_step)
         served = serve_robot(session, options) if robot_only else serve_session(session, options, robot)
         with session, served as server:
             _report(server, options, robot is not None)
@@ -89,13 +96,13 @@ def _access(host: str, token: bool) -> PageAccess:
 
 
 def _open(
-    what: str, backend: str | None, seed: int | None, on_step: Callable[[str], None]
+    what: str, backend: str | None, seed: int | None, max_silence: float, on_step: Callable[[str], None]
 ) -> tuple[NavigationSession, TopicRobot | None]:
     """A session of a navigation file with a robot that is a client, or of a scenario, simulated."""
     if _is_navigation(Path(what)):
         if backend is not None or seed is not None:
             raise ValueError("--backend and --seed are of scenarios; a navigation file names its backend itself")
-        return _real_robot(Path(what))
+        return _real_robot(Path(what), max_silence)
     worlds = [point for point in entry_points(group=WORLDS_GROUP)]
     if not worlds:
         raise ValueError(f"{what} is no navigation file, and no package with scenarios is installed")
@@ -112,16 +119,24 @@ def _is_navigation(file: Path) -> bool:
     return "navigation" not in load_yaml(file).data
 
 
-def _real_robot(file: Path) -> tuple[NavigationSession, TopicRobot]:
+def _real_robot(file: Path, max_silence: float) -> tuple[NavigationSession, TopicRobot]:
     from mbf_abstract.geometry.transform_buffer import TransformBuffer
     from mbf_abstract.server.factory import read_config
     from mbf_abstract.session import NavigationSession
     from mbf_abstract.time.clock import WallClock
+    from mbf_ros.ros2.robot import Frames
     from mbf_ros.rosbridge_robot.topic_robot import TopicRobot
 
     server_class, config = read_config(file)
     session, transforms = NavigationSession(WallClock()), TransformBuffer(config.parameters.tf_cache_time)
-    robot = TopicRobot(transforms, session.clock.now)
+    parameters = config.parameters
+    robot = TopicRobot(
+        transforms,
+        session.clock,
+        Frames(parameters.global_frame, parameters.robot_frame),
+        lambda: max_silence or session.navigator.server.runtime.parameters.command_timeout,
+        parameters.use_odometry,
+    )
     session.serve(server_class, config, robot, transforms)
     return session, robot
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import threading
 from collections.abc import Callable
+
+SECONDS = re.compile(r"-?[\d.]+ s\b")
 
 
 def wait_for_ctrl_c(look: Callable[[], None] = lambda: None, period: float = 1.0) -> None:
@@ -19,3 +22,21 @@ def wait_for_ctrl_c(look: Callable[[], None] = lambda: None, period: float = 1.0
             look()
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def shown_state(problem: Callable[[], str], show: Callable[[str], None]) -> Callable[[], None]:
+    """Return what shows whether goals can be driven, or for what is waited, whenever that changes.
+
+    A text that differs only in its seconds is the same problem.
+    """
+    known: str | None = None
+
+    def look() -> None:
+        nonlocal known
+        text = problem()
+        kind = SECONDS.sub("", text)
+        if kind != known:
+            show(f"waiting: {text}" if text else "move_base_flex is ready")
+        known = kind
+
+    return look

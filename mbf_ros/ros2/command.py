@@ -12,6 +12,7 @@ import typer
 
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from mbf_abstract.commands.waiting import waiting
+from mbf_ros.ending import shown_state
 
 if TYPE_CHECKING:
     from mbf_ros.ros2.node import NavigationNode
@@ -90,18 +91,11 @@ def ros2_interfaces(
 
 def _wait_for_end(node: NavigationNode) -> None:
     """Wait for Ctrl-C or a fault; SIGTERM ends the program by an exception, see ``server.process_end``."""
-    from mbf_ros.ros2.node import COMPILING
-
     pressed = threading.Event()
     before = signal.signal(signal.SIGINT, lambda number, stack: pressed.set())
-    known: str | None = None
+    look = shown_state(node.problem, typer.echo)
     try:
         while not pressed.is_set() and not node.wait(0.1):
-            problem = node.problem()
-            if problem and (not known or problem == COMPILING != known):
-                typer.echo(f"waiting: {problem}")
-            if known != "" and not problem:
-                typer.echo("move_base_flex is ready")
-            known = problem
+            look()
     finally:
         signal.signal(signal.SIGINT, before)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import unix_seconds
+from mbf_abstract.time.ticker import Ticker
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.rosbridge.actionlib import ActionlibServer
 from mbf_ros.rosbridge.authentication import Authentication
@@ -23,7 +24,7 @@ from mbf_ros.rosbridge.page import page_files
 from mbf_ros.rosbridge.publishing import Publisher
 from mbf_ros.rosbridge.rosapi import serve_rosapi
 from mbf_ros.rosbridge.server import RosbridgeServer, ServerOptions
-from mbf_ros.rosbridge_robot.topic_robot import TopicRobot
+from mbf_ros.rosbridge_robot.topic_robot import WATCH_PERIOD, TopicRobot
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def serve_session(
     serve_rosapi(bridge, ServerParameters(navigator), NODE, context, clock.now)
     actionlib = ActionlibServer(bridge.topics, navigator, context, clock.now, server.post)
     if robot is not None:
-        robot.listen(bridge.topics, context, navigator.server.take_scan, options.sensors)
+        robot.listen(bridge.topics, context, navigator.server, options.sensors)
     with ExitStack() as closing:
         publisher = Publisher(
             session, bridge.topics, context, server.post, actionlib, robot is None, options.stamped_commands
@@ -87,8 +88,19 @@ def serve_session(
         if robot is not None:
             robot.on_command.append(publisher.send_command)
             closing.callback(robot.on_command.remove, publisher.send_command)
+            closing.callback(_silence_watch(session, robot).stop)
         closing.callback(server.close)
         if robot is not None:  # while the robot can still hear it
             closing.callback(runtime.gate.close, "the bridge is closed")
         server.start()
         yield server
+
+
+def _silence_watch(session: NavigationSession, robot: TopicRobot) -> Ticker:
+    """Stop the robot at once where something fails to come from it."""
+
+    def look() -> None:
+        if problem := robot.problem():
+            session.navigator.server.runtime.gate.ask_stop(problem)
+
+    return Ticker(session.clock, session.events, look, WATCH_PERIOD, "silence watch")

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
 from mbf_abstract.commands.reporting import readable_errors
-from mbf_ros.ending import wait_for_ctrl_c
+from mbf_ros.ending import shown_state, wait_for_ctrl_c
 from mbf_ros.rosbridge_robot.options import LinkOptions, RobotOptions, TimeSource
-
-if TYPE_CHECKING:
-    from mbf_ros.rosbridge_robot.navigator import RobotNavigator
 
 LOOK_PERIOD = 0.1  # s
 
@@ -53,26 +48,8 @@ def connect(
         link = LinkOptions(secret=secret_file.read_text("utf-8").strip() if secret_file else "")
         options = RobotOptions(link, stamped, max_silence or None, sensors_of(sensor), cloud_period, time)
         with connect_navigator(address, config, options, _warn) as navigator:
-            wait_for_ctrl_c(_shown_state(navigator), LOOK_PERIOD)
+            wait_for_ctrl_c(shown_state(navigator.problem, typer.echo), LOOK_PERIOD)
 
 
 def _warn(text: str) -> None:
     typer.echo(f"warning: {text}", err=True)
-
-
-def _shown_state(navigator: RobotNavigator) -> Callable[[], None]:
-    """Return what prints whether goals can be driven, or for what is waited, whenever that changes."""
-    from mbf_ros.rosbridge_robot.navigator import COMPILING
-
-    known: str | None = None
-
-    def look() -> None:
-        nonlocal known
-        problem = navigator.problem()
-        if problem and (not known or problem == COMPILING != known):
-            typer.echo(f"waiting: {problem}")
-        if known != "" and not problem:
-            typer.echo("move_base_flex is ready")
-        known = problem
-
-    return look

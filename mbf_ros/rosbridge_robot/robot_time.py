@@ -2,7 +2,8 @@
 
 Stamps of odometry serve a robot whose calendar is not ours. A message shows its stamp when it arrives, so the robot's
 time is at least that; of the messages of the last while the one with the least delay shows it best. By this estimate no
-odometry lies in the future, and all times are too early by the least delay of the way here.
+odometry lies in the future, and all times are too early by the least delay of the way here. When the robot's calendar
+is set, messages go on to contradict the estimate, and it begins anew with them; one alone is a bad stamp.
 """
 
 from __future__ import annotations
@@ -13,11 +14,15 @@ from collections import deque
 from mbf_abstract.time.clock import Clock, unix_seconds
 from mbf_ros.messages.geometry import NANOSECONDS
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.ros2.clock import RosClock, SimulatedRosClock
+from mbf_ros.ros2.clock import JUMP, RosClock, SimulatedRosClock
 from mbf_ros.ros2.robot import Arrivals
 from mbf_ros.rosbridge_robot.options import TimeSource
 from mbf_ros.rosbridge_robot.topics import CLOCK, ODOM, RobotTopics
 
+CONTRADICTIONS = 3
+"""How many messages in a row must agree, and differ from the estimate by more than ``JUMP``, to replace it."""
+CONTRADICTION_TIME = 0.5
+"""Least time [s] over which they must arrive; those that a network has held back arrive together."""
 WINDOW = 10.0
 """Time [s] for which a message counts; clocks of computers drift apart by less than a millisecond meanwhile."""
 
@@ -34,16 +39,30 @@ class LeastDelay:
     def __init__(self, window: float = WINDOW) -> None:
         self._window = window
         self._best: deque[tuple[float, float]] = deque()  # arrivals rise, differences fall
+        self._contradicting: list[tuple[float, float]] = []
 
     def add(self, stamp: float, arrival: float) -> float:
         """Take a message, in the order of arrival; returns the sender's time minus ours [s]."""
         difference = stamp - arrival
+        if not self._best or abs(difference - self._best[0][1]) <= JUMP:
+            self._contradicting.clear()
+            self._take(arrival, difference)
+            return self._best[0][1]
+        agreeing = [one for one in self._contradicting if abs(one[1] - difference) <= JUMP]
+        self._contradicting = [*agreeing, (arrival, difference)]
+        if len(agreeing) >= CONTRADICTIONS - 1 and arrival - agreeing[0][0] >= CONTRADICTION_TIME:
+            self._best.clear()
+            for one in self._contradicting:
+                self._take(*one)
+            self._contradicting.clear()
+        return self._best[0][1]
+
+    def _take(self, arrival: float, difference: float) -> None:
         while self._best and self._best[-1][1] <= difference:
             self._best.pop()
         self._best.append((arrival, difference))
         while self._best[0][0] < arrival - self._window:
             self._best.popleft()
-        return self._best[0][1]
 
 
 class RobotTime:

@@ -16,19 +16,28 @@ from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.testing.scripted_session import SCRIPTED, MapFreeServer, _spec
 from mbf_abstract.time.clock import WallClock
+from mbf_ros.ros2.robot import Frames
 from mbf_ros.rosbridge.server import ServerOptions
 from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
 from mbf_ros.rosbridge_robot.topic_robot import TopicRobot
 
 PERIOD = 0.05
+TYPES = {"/tf": "tf2_msgs/TFMessage", "/odom": "nav_msgs/Odometry", "/scan": "sensor_msgs/LaserScan"}
+SCAN = {
+    "header": {"frame_id": "base_link"},
+    "angle_min": 0.0,
+    "angle_increment": 0.1,
+    "range_max": 5.0,
+    "ranges": [2.0],
+}
 
 
 @pytest.fixture
 def session_and_robot(tmp_path):
     session, transforms = NavigationSession(WallClock()), TransformBuffer()
-    robot = TopicRobot(transforms, session.clock.now)
+    robot = TopicRobot(transforms, session.clock, Frames("map", "base_link"), lambda: 1.0)
     specs = tuple(_spec(name, plugin) for name, plugin in SCRIPTED.items())
-    parameters = NavigationParameters(tf_timeout=0.5, command_timeout=0.3)
+    parameters = NavigationParameters(tf_timeout=60.0, command_timeout=0.3, controller_patience=3.0)
     config = Config("none", tmp_path / "scripted.yaml", parameters, specs)
     session.serve(MapFreeServer, config, robot, transforms)
     return session, robot
@@ -39,9 +48,9 @@ class RemoteRobot:
 
     def __init__(self, socket):
         self.socket, self.x, self.yaw, self.commands = socket, 0.0, 0.0, []
-        self.publishes = {"/tf", "/odom"}
+        self.publishes = {"/tf", "/odom", "/scan"}
         self._ended = threading.Event()
-        for topic, kind in (("/tf", "tf2_msgs/TFMessage"), ("/odom", "nav_msgs/Odometry")):
+        for topic, kind in TYPES.items():
             self.send(op="advertise", topic=topic, type=kind)
         self.send(op="subscribe", topic="/cmd_vel", type="geometry_msgs/Twist")
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -70,7 +79,8 @@ class RemoteRobot:
             body = {"translation": {"x": self.x, "y": 0.0}, "rotation": rotation}
             transform = {"header": header, "child_frame_id": "base_link", "transform": body}
             odometry = {"header": header, "twist": {"twist": {"linear": {"x": speed}}}}
-            for topic, message in (("/tf", {"transforms": [transform]}), ("/odom", odometry)):
+            messages = {"/tf": {"transforms": [transform]}, "/odom": odometry, "/scan": SCAN}
+            for topic, message in messages.items():
                 if topic in self.publishes:
                     self.send(op="publish", topic=topic, msg=message)
 
@@ -89,7 +99,7 @@ class RemoteRobot:
 @pytest.fixture
 def remote(session_and_robot, serving, raw):
     session, robot = session_and_robot
-    _, server = serving(session, robot)
+    _, server = serving(session, robot, sensors={"/scan": ("sensor_msgs/LaserScan", "scan")})
     made = RemoteRobot(raw(server.port))
     known = threading.Event()
     session.navigator.server.runtime.transforms.when_available("map", "base_link", None, lambda _: known.set())
@@ -105,8 +115,8 @@ def test_it_drives_to_the_goal(remote):
     assert max(robot.commands) > 0.1
 
 
-@pytest.mark.parametrize("lost", ["/tf", "/odom"])
-def test_when_it_falls_silent_the_goal_ends_and_it_is_stopped(remote, lost):
+@pytest.mark.parametrize("lost", TYPES)
+def test_when_it_falls_silent_it_is_stopped_long_before_tf_timeout_and_the_goal_ends(remote, lost):
     session, robot = remote
     driving = threading.Event()
     handle = session.navigator.send(MoveBaseGoal(Pose.planar(50.0, 0.0)))

@@ -8,7 +8,7 @@ from mbf_abstract.time.sim_clock import SimClock
 from mbf_ros.messages.geometry import MessageContext, duration
 from mbf_ros.ros2.robot import Arrivals
 from mbf_ros.rosbridge_robot.options import TimeSource
-from mbf_ros.rosbridge_robot.robot_time import LeastDelay, RobotTime
+from mbf_ros.rosbridge_robot.robot_time import CONTRADICTIONS, LeastDelay, RobotTime
 from mbf_ros.rosbridge_robot.topics import Reports, RobotTopics
 
 ROBOT = 5000.0  # s by which the robot's calendar is ahead
@@ -68,7 +68,7 @@ def test_time_passes_as_the_topic_clock_says_and_a_jump_back_is_one():
     assert "no message on /clock for 3.00 s" in site.arrivals.problem(1.0)
 
 
-@given(st.lists(st.tuples(st.floats(0.0, 3.0), st.floats(0.0, 1.0)), min_size=1, max_size=40), st.floats(0.5, 6.0))
+@given(st.lists(st.tuples(st.floats(0.0, 3.0), st.floats(0.0, 0.49)), min_size=1, max_size=40), st.floats(0.5, 6.0))
 def test_the_least_delay_is_that_of_all_messages_in_the_window(messages, window):
     least, arrival, seen = LeastDelay(window), 0.0, []
     for gap, delay in messages:
@@ -77,3 +77,57 @@ def test_the_least_delay_is_that_of_all_messages_in_the_window(messages, window)
         seen.append((arrival, stamp - arrival))
         naive = max(difference for at, difference in seen if at >= arrival - window)
         assert least.add(stamp, arrival) == naive
+
+
+@pytest.fixture
+def followed():
+    """A site whose robot has been heard for a while, and the jumps of its time."""
+    site, jumps = Site(TimeSource.ODOM), []
+    say(site, 50)
+    site.time.clock(0.0).on_jump.append(jumps.append)
+    return site, jumps
+
+
+def say(site, count, step=0.0):
+    """Odometry at 50 Hz from a robot whose calendar is off by a step."""
+    for _ in range(count):
+        site.real.sleep(0.02)
+        site.odom(site.real.now() + ROBOT + step)
+
+
+@pytest.mark.parametrize("step", [-3.0, 3.0])
+def test_a_calendar_that_is_set_is_one_jump_within_a_second(followed, step):
+    site, jumps = followed
+    say(site, 50, step)
+    assert jumps == [pytest.approx(step, abs=0.1)]
+    say(site, 600, step)
+    assert len(jumps) == 1
+
+
+@pytest.mark.parametrize("step", [-3.0, 3.0])
+def test_a_bad_stamp_now_and_then_is_no_jump(followed, step):
+    site, jumps = followed
+    for _ in range(3):
+        say(site, 1, step)
+        say(site, 30)
+    assert jumps == []
+
+
+def test_messages_that_the_network_has_held_back_for_seconds_change_nothing():
+    least = LeastDelay()
+    least.add(ROBOT, 0.0)
+    sent = [0.02 * number for number in range(1, 101)]
+    found = {least.add(stamp + ROBOT, 2.0 + 0.001 * number) for number, stamp in enumerate(sent)}
+    assert found == {ROBOT}
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(-5.0, 5.0)), min_size=1, max_size=40))
+def test_whatever_came_before_the_estimate_is_that_of_messages_that_agree_for_half_a_second(messages):
+    least, arrival = LeastDelay(), 0.0
+    for gap, difference in messages:
+        arrival += gap
+        least.add(arrival + ROBOT + difference, arrival)
+    for _ in range(CONTRADICTIONS):
+        arrival += 0.3
+        found = least.add(arrival + ROBOT, arrival)
+    assert found == pytest.approx(ROBOT, abs=0.51)
