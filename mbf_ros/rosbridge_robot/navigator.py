@@ -114,7 +114,7 @@ class RobotNavigator:
     def serve(self, server_class: Any, config: Config) -> None:
         """Connect, and make the navigator; waits for the robot's time where its messages show that."""
         self._frames = Frames(config.parameters.global_frame, config.parameters.robot_frame)
-        self._links.data.open()
+        self._links.open_data()
         self._clock = clock = self._robot_clock()
         self.session = session = NavigationSession(clock)
         self._closing.callback(session.close)

@@ -201,9 +201,12 @@ planners: [{{name: shortest, type: straight_line}}]
 
 
 class Peers:
-    """A robot behind a server of its own, a wire, and the navigator that is connected to it."""
+    """A robot behind a server of its own, a wire, and the navigator that is connected to it.
 
-    def __init__(self, closing, folder, backend, **options):
+    ``driver_timeout``: time [s] without a command after which the robot stops by itself.
+    """
+
+    def __init__(self, closing, folder, backend, driver_timeout=0.5, **options):
         self._closing, self.config = closing, folder / f"{backend}.yaml"
         if backend == "mesh":
             floor = trimesh.Trimesh(*heightfield_mesh(np.zeros((21, 41)), 1.0, 1.0), process=False)
@@ -211,7 +214,9 @@ class Peers:
         self.config.write_text(ROBOTS[backend])
         self.reports, self.report_raises = Answers(), None
         self.session = LoopbackSession(Pose.planar(1.0, 5.0), WallClock())
-        self.session.serve(*read_config(self.config), self.session.robot, self.session.transforms)
+        driver = folder / "driver.yaml"
+        driver.write_text(f"command_timeout: {driver_timeout}\n{ROBOTS[backend]}")
+        self.session.serve(*read_config(driver), self.session.robot, self.session.transforms)
         closing.enter_context(self.session)
         self.robot = self.session.robot
         self.server = closing.enter_context(serve_robot(self.session, BridgeOptions(ServerOptions(port=0))))

@@ -39,9 +39,11 @@ def config(tmp_path):
 
 @pytest.fixture
 def robot(config):
-    """A robot behind a server that asks for a token."""
+    """A robot behind a server that asks for a token; it stops by itself only after 10 s."""
+    driver = config.with_name("driver.yaml")
+    driver.write_text(f"command_timeout: 10.0\n{CONFIG}")
     with LoopbackSession(Pose.planar(1.0, 4.0), WallClock()) as session:
-        session.serve(*read_config(config), session.robot, session.transforms)
+        session.serve(*read_config(driver), session.robot, session.transforms)
         access = PageAccess.by_token("127.0.0.1")
         with serve_robot(session, BridgeOptions(ServerOptions(access, port=0))) as server:
             token = next(token for token, role in access.roles.items() if role is Role.STEER)
@@ -103,6 +105,20 @@ def test_a_wrong_token_in_the_address_is_refused_and_not_printed(config, robot):
     assert result.exit_code == 2
     assert "access is refused (HTTP 403: the token in the address is wrong)" in result.output
     assert "--secret-file" in result.output and "not-the-token" not in result.output
+
+
+REFUSALS = {"not it": "the secret is wrong, or the calendars differ", "": "if it asks for auth, give --secret-file"}
+
+
+@pytest.mark.parametrize("secret", REFUSALS)
+@pytest.mark.parametrize("time", ["calendar", "odom"])
+def test_a_secret_that_is_wrong_or_missing_ends_the_command_with_one_text(config, robot, tmp_path, secret, time):
+    file = tmp_path / "secret"
+    file.write_text(secret)
+    command = [*CONNECT, f"ws://127.0.0.1:{robot[1]}", str(config), "--secret-file", str(file), "--time", time]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=100)
+    assert ended.returncode == 2
+    assert REFUSALS[secret] in ended.stderr and "1008" in ended.stderr and "warning" not in ended.stderr
 
 
 @pytest.mark.parametrize(("signal_", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 128 + signal.SIGTERM)])

@@ -123,12 +123,15 @@ def test_while_both_connections_are_cut_the_robot_stands_and_afterwards_the_next
 
 
 def test_when_only_commands_are_cut_zero_comes_first_on_the_next_connection_and_the_goal_goes_on(driven):
-    made, sender = driven()
+    made, sender = driven(driver_timeout=10.0)
     goal = sender.send("/move_base_flex/move_base", target_pose=pose(*FAR))
     made.wait_until(lambda: made.moves)
     before = len(made.commands())
     made.wire.cut_once(slice(1, 2))
     made.wait_until(lambda: 0.0 in made.commands()[before:])
+    stopped = before + made.commands()[before:].index(0.0)
+    last, zero = (time for time, _ in tuple(made.robot.commands)[stopped - 1 : stopped + 1])
+    assert zero - last < 10.0  # else it has stopped by itself
     assert made.reports.wait_for(lambda text: text == "commands: connected again")
     made.wait_until(lambda: made.moves)
     sender.say(op="cancel_action_goal", id=goal, action="/move_base_flex/move_base")
