@@ -24,6 +24,7 @@ from mbf_abstract.geometry import FloatArray
 from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recording import Recording
 from terrain.viewer.pictures.colours import ACTORS, DRIVEN, FLEET, LEVELS, PLANNED, Colour, slope_legend
+from terrain.viewer.pictures.incident_marks import mark_of
 from terrain.viewer.pictures.picture import (
     Extent,
     draw_line,
@@ -51,7 +52,6 @@ LEAST_SIDE = 0.5  # of the longer side of the route's box
 INSET_CELLS = 150  # along the longer side of an inset's world
 DASHES = (0, (3.0, 1.4))
 PLAN_WIDTH = 3.6
-INCIDENTS = {"collision": ("D", "collision"), "near_miss": ("^", "near miss"), "tipped_over": ("X", "tip-over")}
 INCIDENT_COLOUR = "#b00020"
 
 
@@ -204,12 +204,10 @@ def _draw_incidents(panel: Panel, recording: Recording) -> None:
     for event in recording.events:
         if event.kind is not EventKind.INCIDENT or not panel.shows(np.array([event.data["z"]]))[0]:
             continue
-        what = next((kind for kind in INCIDENTS if str(event.data["what"]).startswith(kind)), None)
-        if what is not None:
-            marker, label = INCIDENTS[what]
-            style: dict[str, Any] = {"linestyle": "none", "markeredgecolor": "white", "markersize": 8, "zorder": 9}
-            place = np.array([event.data["x"], event.data["y"]], dtype=np.float64).tolist()
-            panel.axes.plot(*place, marker=marker, color=INCIDENT_COLOUR, label=label, **style)
+        mark = mark_of(str(event.data["what"]))
+        style: dict[str, Any] = {"linestyle": "none", "markeredgecolor": "white", "markersize": 8, "zorder": 9}
+        place = np.array([event.data["x"], event.data["y"]], dtype=np.float64).tolist()
+        panel.axes.plot(*place, marker=mark.marker, color=INCIDENT_COLOUR, label=mark.label, **style)
 
 
 def _caption(panel: Panel, number: int) -> None:

@@ -17,6 +17,7 @@ from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import SYMBOLS
 from terrain.recording.recording import Recording
 from terrain.viewer.pictures.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, SCAN, Colour, slope_legend
+from terrain.viewer.pictures.incident_marks import mark_of
 from terrain.viewer.pictures.shading import FLAT_GROUND
 from terrain.viewer.reports.event_lines import is_shown, line_of
 from terrain.viewer.reports.tree_html import COLOURS, INDENT
@@ -25,8 +26,6 @@ SHOWN_LINES = 8
 MAX_LINES = 2000  # a run with more leaves out the oldest
 MAX_MARKS = 200  # incidents on the time bar; a run with more leaves out the newest
 LEAD = 1.0  # s before an incident, where a jump to it ends
-SYMBOLS_OF_INCIDENTS = {"tipped_over": "✖", "near_miss": "▲"}
-COLLISION = "◆"
 
 
 class Entry(NamedTuple):
@@ -39,9 +38,11 @@ class Entry(NamedTuple):
 
 def panel_html(events: Iterable[Event], legend: Iterable[Entry] = (), begin: float = 0.0) -> str:
     """Return the panel; times in it count from ``begin`` [s]."""
-    contents = _data(tuple(replace(event, time=event.time - begin) for event in events))
+    timed = tuple(replace(event, time=event.time - begin) for event in events)
+    contents, incidents = _data(timed), sum(event.kind is EventKind.INCIDENT for event in timed)
+    count = str(incidents) if incidents <= MAX_MARKS else f"{incidents}, the first {MAX_MARKS} are shown"
     tree = "<details open><summary>Behaviour tree</summary><div id='run-tree'></div></details>"
-    shown = f"<details open><summary>Incidents ({len(contents['incidents'])})</summary><div id='run-incidents'></div>"
+    shown = f"<details open><summary>Incidents ({count})</summary><div id='run-incidents'></div>"
     return (
         "<details open><summary>What happened</summary><div id='run-lines'></div></details>"
         f"{tree if contents['trees'] else ''}"
@@ -79,7 +80,7 @@ def _data(events: tuple[Event, ...]) -> dict[str, Any]:
 def _incident(event: Event) -> tuple[float, str, str, str]:
     """Time [s], text, colour and the symbol on the time bar, which needs no colour to be read."""
     line = line_of(event)
-    return line.time, line.text, line.colour, SYMBOLS_OF_INCIDENTS.get(str(event.data["what"]), COLLISION)
+    return line.time, line.text, line.colour, mark_of(str(event.data["what"])).symbol
 
 
 def _take_tree_event(trees: list[dict[str, Any]], time: float, data: dict[str, Any]) -> None:

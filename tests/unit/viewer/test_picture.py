@@ -100,8 +100,9 @@ def test_a_route_in_a_corner_of_the_world_is_shown_large_with_an_inset_of_the_wo
     assert count(pixels_of(picture_png(whole)), DRIVEN) > 2000, "large enough for the robot to be seen"
 
 
-def test_incidents_are_in_the_picture(hill_recording):
-    data = {"what": "collision_person", "x": 20.0, "y": 12.0, "z": 1.0}
+@pytest.mark.parametrize("what", ["collision_with_person", "slipping", "stuck", "high_centred"])
+def test_incidents_are_in_the_picture(hill_recording, what):
+    data = {"what": what, "x": 20.0, "y": 12.0, "z": 1.0}
     met = replace(hill_recording, events=(Event(3.0, EventKind.INCIDENT, "simulator", data),))
 
     red = [int(INCIDENT_COLOUR[k : k + 2], 16) for k in (1, 3, 5)]

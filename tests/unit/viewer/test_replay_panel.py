@@ -10,11 +10,13 @@ import pytest
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import NodeState
+from terrain.physics.incidents import IncidentKind
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.colours import BAD, GOOD, WARNING
+from terrain.viewer.pictures.incident_marks import OTHER, mark_of
 from terrain.viewer.replay.replay_page import replay_html
-from terrain.viewer.replay.run_panel import legend_of, panel_html
+from terrain.viewer.replay.run_panel import MAX_MARKS, legend_of, panel_html
 from terrain.viewer.reports.tree_html import worth_showing
 
 WELL = Verdict(0, "goal reached")
@@ -46,6 +48,34 @@ def test_the_page_carries_each_run_of_a_tree_and_its_changes_with_their_times():
         [2.0, 1, "FAILURE", "walled in"],
     ]
     assert (second["time"], second["changes"]) == (5.0, [])
+
+
+def incident(what, time=1.0):
+    data = {"what": what, "x": 20.0, "y": 12.0, "z": 1.0, "robot_speed": 1.2, "moved": "robot"}
+    return Event(time, EventKind.INCIDENT, "simulator", data)
+
+
+def test_each_kind_of_incident_has_a_symbol_of_its_own_and_collisions_share_one():
+    kinds = [kind.value for kind in IncidentKind]
+
+    symbols = [entry[3] for entry in contents(panel_html(incident(kind) for kind in kinds))["incidents"]]
+
+    of_kind = {
+        "collision" if kind.startswith("collision") else kind: symbol
+        for kind, symbol in zip(kinds, symbols, strict=True)
+    }
+    collisions = {symbol for kind, symbol in zip(kinds, symbols, strict=True) if kind.startswith("collision")}
+    assert collisions == {of_kind["collision"]}
+    assert len(set(of_kind.values())) == len(of_kind) == 6
+    assert mark_of("on fire") is OTHER and OTHER.symbol not in of_kind.values()
+
+
+def test_incidents_are_counted_before_those_that_are_too_many_are_left_out():
+    few, many = (panel_html([incident("slipping", float(at)) for at in range(count)]) for count in (3, MAX_MARKS + 50))
+
+    assert "<summary>Incidents (3)</summary>" in few
+    assert f"<summary>Incidents ({MAX_MARKS + 50}, the first {MAX_MARKS} are shown)</summary>" in many
+    assert len(contents(many)["incidents"]) == MAX_MARKS
 
 
 def test_the_panel_has_no_tree_where_none_ran():
