@@ -139,7 +139,7 @@ def large_recording() -> Recording:
     recorder = Recorder("large", "mesh", RobotShape.of(HUSKY), poses[0], [poses[-1]], ground=hills.surface())
     recorder.path(0.0, [pose.position for pose in poses])
     for step in range(0, 200, 10):
-        recorder.scan(step / RATE, np.array(poses[step].position) + np.eye(3))
+        recorder.scan(step / RATE, np.array(poses[step].position) + np.eye(3), poses[step].position)
     drive(recorder, poses, speed=3.0)
     return recorder.finish(Verdict(0, "goal reached"))
 
