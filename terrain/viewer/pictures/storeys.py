@@ -7,16 +7,16 @@ storey at a time, so that a roof does not hide the robot under it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray
+from terrain.viewer.pictures.raster import paint_triangles
 from terrain.viewer.pictures.shading import face_normals
 from terrain.worlds.surface import Surface
 
 LEVEL = np.cos(np.radians(5.0))  # faces steeper than 5 degrees are ramps
-CELL = 1.0  # m; of the grid in which floors are looked for above each other
+POINTS = 256  # along the longer side of the grid of points at which floors are looked for above each other
 HEADROOM = 1.8  # m; floors nearer than this are one storey
-LEAST_OVERLAP = 0.05  # of the level cells; less is a step or a bench, no storey
+LEAST_OVERLAP = 0.04  # of the points with level faces; less is a step or a bench, no storey
 LEAST_FLOOR = 0.04  # of the area of all level faces
 BIN = 0.1  # m of height
 
@@ -26,21 +26,14 @@ def storeys(ground: Surface | None) -> list[float]:
     if ground is None or not len(ground.faces):
         return []
     corners = ground.vertices[ground.faces]
-    level = face_normals(ground)[:, 2] > LEVEL
-    middles, areas = corners[level].mean(axis=1), _plan_areas(corners[level])
-    if not len(middles) or _share_of_overlap(middles) < LEAST_OVERLAP:
+    corners = corners[face_normals(ground)[:, 2] > LEVEL]
+    if not len(corners) or _share_of_overlap(corners) < LEAST_OVERLAP:
         return []
     floors: list[float] = []
-    for floor in _floors(middles[:, 2], areas):
+    for floor in _floors(corners[:, :, 2].mean(axis=1), _plan_areas(corners)):
         if not floors or floor - floors[-1] >= HEADROOM:
             floors.append(floor)
     return floors if len(floors) > 1 else []
-
-
-def storey_of(floors: list[float], heights: FloatArray) -> NDArray[np.intp]:
-    """Index (n,) of the storey that each height (n,) [m] belongs to: the middle between two floors parts them."""
-    middles = 0.5 * (np.array(floors[:-1]) + np.array(floors[1:]))
-    return np.searchsorted(middles, heights)
 
 
 def _plan_areas(corners: FloatArray) -> FloatArray:
@@ -49,14 +42,27 @@ def _plan_areas(corners: FloatArray) -> FloatArray:
     return np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2.0
 
 
-def _share_of_overlap(middles: FloatArray) -> float:
-    """Share of the cells with level faces that have some at least ``HEADROOM`` above others."""
-    x, y = np.floor((middles[:, :2] - middles[:, :2].min(axis=0)) / CELL).astype(np.int64).T
-    _, cell = np.unique(x * (y.max() + 1) + y, return_inverse=True)
-    lowest, highest = np.full(cell.max() + 1, np.inf), np.full(cell.max() + 1, -np.inf)
-    np.minimum.at(lowest, cell, middles[:, 2])
-    np.maximum.at(highest, cell, middles[:, 2])
-    return float(np.mean(highest - lowest >= HEADROOM))
+def _share_of_overlap(corners: FloatArray) -> float:
+    """Share of the points on level faces (n, 3, 3) that have some at least ``HEADROOM`` above others.
+
+    The faces are seen straight from above and from below. However large or small they are, they cover all points of
+    their area.
+    """
+    lower, upper = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    scale = POINTS / max(float((upper - lower)[:2].max()), 1e-9)
+    above = _nearest(scale * (corners[:, :, :2] - lower[:2]), corners[:, :, 2] - lower[2])
+    below = _nearest(scale * (corners[:, :, :2] - lower[:2]), upper[2] - corners[:, :, 2])
+    gaps = (above + below - (upper[2] - lower[2]))[above > -0.5]
+    return float(np.mean(gaps >= HEADROOM)) if len(gaps) else 0.0
+
+
+def _nearest(places: FloatArray, heights: FloatArray) -> FloatArray:
+    """Largest of the heights (n, 3) [m] of triangles (n, 3, 2) at each point of the grid; -1 where there is none."""
+    columns, rows = np.ceil(places.max(axis=(0, 1))).astype(np.int64)
+    found = np.zeros((rows, columns), np.float32)
+    colours, pixels = np.zeros((len(places), 3), np.uint8), np.zeros((rows, columns, 3), np.uint8)
+    paint_triangles(np.dstack([places, 1.0 + heights]), colours, pixels, found)
+    return found.astype(np.float64) - 1.0
 
 
 def _floors(heights: FloatArray, areas: FloatArray) -> list[float]:
