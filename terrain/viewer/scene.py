@@ -38,6 +38,7 @@ SCAN_POINT = 0.06  # m
 CAMERA_FIELD_OF_VIEW = 0.8  # rad, vertical
 CAMERA_HEIGHT = 0.8  # of the length of the route
 CAMERA_SETBACK = 0.85
+LEAST_HOLD = 2.0  # s that a scan is shown
 
 
 def add_world(scene: Scene, recording: Recording) -> None:
@@ -224,6 +225,11 @@ def wheel_angles(shape: RobotShape, times: FloatArray, twists: FloatArray) -> Fl
     forward = twists[:, :1] - twists[:, 2:] * shape.wheels[:, 1]
     steps = np.diff(times, prepend=times[:1])[:, None]
     return np.asarray(np.cumsum(forward * steps, axis=0) / shape.wheel_radius)
+
+
+def scan_hold(times: Sequence[float]) -> float:
+    """How long a scan is shown [s] where no newer one comes: longer than between two of them, at these times [s]."""
+    return max(LEAST_HOLD, 1.5 * float(np.median(np.diff(times)))) if len(times) > 1 else LEAST_HOLD
 
 
 def _add_wheel(scene: Scene, node: str, centre: FloatArray, shape: RobotShape, width: float) -> Any:

@@ -20,7 +20,7 @@ from terrain.viewer.pictures.raster import Camera, Canvas, paint_line, paint_sur
 from terrain.viewer.pictures.shading import lit_colours
 from terrain.viewer.pictures.shapes import marks, prism, standing_things
 from terrain.viewer.pictures.storeys import storeys
-from terrain.viewer.scene import look_at_route
+from terrain.viewer.scene import look_at_route, scan_hold
 from terrain.worlds.surface import NO_SURFACE, Surface, joined
 
 LARGEST_FACE = 1.0  # m
@@ -58,6 +58,7 @@ class MovingPicture:
         self._fine = SMOOTHING * size[0], SMOOTHING * size[1]
         self._world, self._colours = _world(recording)
         self._has_storeys = bool(storeys(recording.ground))
+        self._scan_hold = scan_hold([time for time, _ in recording.scans])
         self._headings = _smooth_headings(recording)
         self._overviews: dict[float, Canvas] = {}  # by the height of the cut
         self.overview = overview_camera(recording, self._fine)
@@ -105,8 +106,8 @@ class MovingPicture:
                 paint_line(canvas, camera, dash, PLANNED, PLAN_WIDTH * SMOOTHING, PLAN_NEARER)
         track = _below(recording.poses[: index + 1, :3], cut)
         paint_line(canvas, camera, track, DRIVEN, TRACK_WIDTH * SMOOTHING, TRACK_NEARER)
-        scan = next((points for time, points in reversed(recording.scans) if time <= now), None)
-        if scan is not None and len(scan):
+        seen, scan = next((scan for scan in reversed(recording.scans) if scan[0] <= now), (now, ()))
+        if now - seen <= self._scan_hold:
             for point in scan:
                 ends = np.array([point - SCAN_POINT * UP, point + SCAN_POINT * UP])
                 paint_line(canvas, camera, ends, SCAN, 1.5 * SMOOTHING, PLAN_NEARER)

@@ -29,13 +29,14 @@ from terrain.viewer.pictures.storeys import storeys
 from terrain.viewer.replay.bodies import actor_parts, robot_parts
 from terrain.viewer.replay.packing import Packer
 from terrain.viewer.replay.world_mesh import WorldMesh, world_mesh
-from terrain.viewer.scene import route_of, wheel_angles
+from terrain.viewer.scene import route_of, scan_hold, wheel_angles
 
 FRAME_RATE = 10.0  # Hz of recorded time
 MAX_FRAMES = 3000  # longer runs get fewer frames a second, so that the file stays small
 MAX_SCANS = 300
 MAX_SCAN_POINTS = 180
-LEAST_STEP = 0.1  # m between two points of a plan
+MAX_PLAN_POINTS = 200_000  # of all plans of a robot; they take 16 bytes each in the browser
+LEAST_STEP = 0.1  # m between two points of a plan; larger where the plans have too many
 LEAST_RELIEF = 2.0  # m; lower ground has no contour lines
 CONTOURS = 12  # about so many on all of the relief
 CONTOUR_STEPS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # m
@@ -145,6 +146,7 @@ def _robot(
     angles = wheel_angles(shape, recording.times, twists)
     scans = recording.scans[:: -(-len(recording.scans) // MAX_SCANS)] if recording.scans else []
     scans = [(time, points[:: max(1, len(points) // MAX_SCAN_POINTS)]) for time, points in scans]
+    plans = thinned_plans(seen_plans(recording.paths, recording.times[frames]))
     return {
         "name": well_formed(looks.name),
         "ring": looks.colour,
@@ -156,8 +158,9 @@ def _robot(
         "angles": packer.add_milli(angles[frames]),
         "speeds": packer.add_milli(np.hypot(twists[frames, 0], twists[frames, 1])),
         "tilts": packer.add_milli(np.degrees(recording.tilt[frames])),
-        "plans": _sets(packer, [(time, _thinned(points)) for time, points in recording.paths], origin, begin),
+        "plans": _sets(packer, plans, origin, begin),
         "scans": _sets(packer, scans, origin, begin),
+        "scanHold": scan_hold([time for time, _ in scans]),
     }
 
 
@@ -183,11 +186,31 @@ def _sets(packer: Packer, sets: Sequence[StampedPoints], origin: FloatArray, beg
     }
 
 
-def _thinned(points: FloatArray) -> FloatArray:
-    """A line without points nearer than ``LEAST_STEP`` to the last one kept; its ends stay."""
-    keep, last = [0], points[0] if len(points) else None
-    for index in range(1, len(points)):
-        if index == len(points) - 1 or np.abs(points[index] - last).max() > LEAST_STEP:
-            keep.append(index)
-            last = points[index]
-    return points[keep] if len(points) else points
+def seen_plans(plans: Sequence[StampedPoints], times: FloatArray) -> list[StampedPoints]:
+    """Plans that are the newest one at some of the times (n,) [s], and the last one; at most n + 1."""
+    begins = np.array([time for time, _ in plans])
+    newest = np.append(np.searchsorted(begins, times, side="right") - 1, len(plans) - 1)
+    return [plans[index] for index in np.unique(newest[newest >= 0])]
+
+
+def thinned_plans(plans: Sequence[StampedPoints], most: int = MAX_PLAN_POINTS) -> list[StampedPoints]:
+    """Plans with one point for each ``LEAST_STEP`` of the way, or for each larger step that leaves ``most`` in all."""
+    along = [_along(points) for _, points in plans]
+    step, longest = LEAST_STEP, max((float(way[-1]) for way in along if len(way)), default=0.0)
+    keep = [_one_for_each(step, way) for way in along]
+    while sum(map(np.count_nonzero, keep)) > most and step < longest:
+        step *= 2.0
+        keep = [_one_for_each(step, way) for way in along]
+    return [(time, points[kept]) for (time, points), kept in zip(plans, keep, strict=True)]
+
+
+def _along(points: FloatArray) -> FloatArray:
+    """Way (n,) [m] until each point, each piece of it measured along its longest axis."""
+    return np.cumsum(np.abs(np.diff(points, axis=0, prepend=points[:1])).max(axis=1, initial=0.0))
+
+
+def _one_for_each(step: float, along: FloatArray) -> NDArray[np.bool_]:
+    """Mask (n,) of the first point in each step [m] of the way, and of both ends."""
+    keep = np.diff(np.floor(along / step + 1e-6), prepend=-1.0) > 0.0  # points at the step's own distance all stay
+    keep[-1:] = True
+    return keep

@@ -15,7 +15,7 @@ from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.animation import FRAMES, SIZE, write_animation
-from terrain.viewer.pictures.colours import BODY, DRIVEN, OBSTACLE, PLANNED
+from terrain.viewer.pictures.colours import BODY, DRIVEN, OBSTACLE, PLANNED, SCAN
 from terrain.viewer.pictures.film import ENDING, FRAME_RATE, shots, write_film
 from terrain.viewer.pictures.moving_picture import MovingPicture, overview_camera
 from terrain.viewer.pictures.picture import ViewerMissing
@@ -63,6 +63,17 @@ def test_a_run_that_never_began_is_a_still_picture(tmp_path):
     write_animation(tmp_path / "nothing.gif", empty)
 
     assert len({frame.tobytes() for frame in frames_of(tmp_path / "nothing.gif")}) == 1
+
+
+@pytest.mark.parametrize(("spacing", "shown"), [(1.0, False), (6.0, True)])
+def test_a_scan_is_shown_until_a_newer_one_is_due(hill_recording, spacing, shown):
+    scan = hill_recording.poses[40, :3] + np.random.default_rng(1).uniform([-5, -5, 1.5], [5, 5, 2.5], (400, 3))
+    run = replace(hill_recording, scans=[(now, scan) for now in (4.0 - spacing, 4.0)])
+
+    red = [middle(np.asarray(MovingPicture(run, SIZE).frame(at, follow=False)).astype(int), SCAN)[1] for at in (45, 90)]
+
+    assert red[0] > 50
+    assert (red[1] > 50) == shown
 
 
 def first_second(recording):

@@ -24,7 +24,16 @@ from terrain.viewer.pictures.colours import FLEET
 from terrain.viewer.pictures.moving_picture import status_text
 from terrain.viewer.replay.packing import Packer
 from terrain.viewer.replay.replay_page import joint_replay_html, replay_html
-from terrain.viewer.replay.scene_content import FRAME_RATE, MAX_FRAMES, contour_step, frame_indices
+from terrain.viewer.replay.scene_content import (
+    FRAME_RATE,
+    LEAST_STEP,
+    MAX_FRAMES,
+    MAX_SCANS,
+    contour_step,
+    frame_indices,
+    seen_plans,
+    thinned_plans,
+)
 from terrain.viewer.replay.world_mesh import coarse_faces
 from terrain.viewer.scene import wheel_angles
 from terrain.worlds.surface import Surface, cylinder
@@ -41,6 +50,73 @@ def test_frames_come_at_the_frame_rate_with_first_and_last():
 
 def test_a_long_run_gets_no_more_frames_than_the_limit():
     assert len(frame_indices(np.arange(0.0, 3600.0, 0.1))) <= MAX_FRAMES + 2
+
+
+times = st.lists(st.floats(0.0, 20.0), max_size=30).map(sorted)
+
+
+@settings(max_examples=60)
+@given(times, times)
+def test_a_plan_that_is_replaced_before_the_next_frame_is_left_out(begins, frames):
+    plans = [(begin, np.full((2, 3), float(number))) for number, begin in enumerate(begins)]
+    wanted = {max((k for k, begin in enumerate(begins) if begin <= time), default=None) for time in frames}
+    wanted = (wanted - {None}) | ({len(plans) - 1} if plans else set())
+
+    found = [int(points[0, 0]) for _, points in seen_plans(plans, np.array(frames))]
+
+    assert found == sorted(wanted)
+
+
+def naive_thinned(points, step):
+    """The first point in each step of the way, and both ends."""
+    way, last, kept = 0.0, -1, []
+    for number, point in enumerate(points):
+        way += np.abs(point - points[max(number - 1, 0)]).max()
+        if math.floor(way / step + 1e-6) > last or number == len(points) - 1:
+            kept.append(point)
+        last = math.floor(way / step + 1e-6)
+    return np.array(kept).reshape(-1, 3)
+
+
+@settings(max_examples=60)
+@given(hnp.arrays(np.float64, st.tuples(st.integers(0, 40), st.just(3)), elements=st.floats(-0.3, 0.3)))
+def test_a_plan_keeps_its_ends_and_a_point_for_each_step_of_its_way(steps):
+    points = np.cumsum(steps, axis=0)
+
+    ((_, kept),) = thinned_plans([(0.0, points)])
+
+    np.testing.assert_array_equal(kept, naive_thinned(points, LEAST_STEP))
+
+
+def test_plans_with_a_point_for_each_step_keep_all_points():
+    line = np.column_stack([LEAST_STEP * np.arange(500), np.zeros((500, 2))])
+
+    assert len(thinned_plans([(0.0, line)])[0][1]) == 500
+
+
+@settings(max_examples=30)
+@given(st.lists(st.integers(0, 300), min_size=1, max_size=8), st.integers(16, 500))
+def test_all_plans_together_have_no_more_points_than_the_limit_and_keep_their_ends(lengths, most):
+    plans = [(float(k), np.arange(3.0 * length).reshape(-1, 3)) for k, length in enumerate(lengths)]
+
+    thinned = thinned_plans(plans, most)
+
+    assert sum(len(points) for _, points in thinned) <= most
+    for (_, points), (_, kept) in zip(plans, thinned, strict=True):
+        np.testing.assert_array_equal(kept[:1], points[:1])
+        np.testing.assert_array_equal(kept[-1:], points[-1:])
+
+
+def test_a_scan_is_shown_until_the_next_one_that_is_kept_in_a_long_run(hill_recording, contents_of):
+    long = np.arange(0.0, 1800.0, 1.0)
+    scans = [(float(time), np.zeros((1, 3))) for time in long]
+
+    for run, hold in ((replace(hill_recording, scans=scans[:20]), 2.0), (replace(hill_recording, scans=scans), 9.0)):
+        scene, arrays = contents_of(replay_html(run))
+        (robot,) = scene["robots"]
+        kept = arrays[robot["scans"]["times"]][:, 0] / 1e3
+        assert len(kept) <= MAX_SCANS
+        assert robot["scanHold"] == hold and np.diff(kept).max() < hold
 
 
 def test_a_wheel_that_rolls_its_circumference_has_turned_once():

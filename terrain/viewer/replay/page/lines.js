@@ -15,7 +15,7 @@ class Lines {
     this.robots = scene.robots.map(robot => ({
       colour: paintOf(robot.ring), planned: paintOf(robot.plan), track: this.track(fromMilli(arrays[robot.positions])),
       plans: this.sets(robot.plans, arrays, points => withLengths(points)),
-      scans: this.sets(robot.scans, arrays, points => points)}));
+      scans: {...this.sets(robot.scans, arrays, points => points), hold: robot.scanHold}}));
   }
 
   line(buffer, first) {
@@ -81,7 +81,7 @@ class Lines {
 
   scan(common, scans, now, camera) {
     const scan = this.newest(scans, now), gl = this.drawing.gl;
-    if (!scan || now - scan.time > 2) return;
+    if (!scan || now - scan.time > scans.hold) return;
     if (scan.array === undefined) scan.array = this.drawing.layout(scans.buffer, 12, [[0, 3, gl.FLOAT, false, 12 * scan.first]]);
     this.drawing.use(this.pointProgram, {...common, paint: [...this.scanned, 1], scale: 0.07 * camera.focal * common.ratio});
     gl.bindVertexArray(scan.array);

@@ -42,7 +42,7 @@ class Replay {
     robots.addEventListener('change', () => { this.chosen = Number(robots.value); this.dirty = true; });
     document.getElementById('help').addEventListener('click', showKeys);
     document.getElementById('panel-button').addEventListener('click', () => this.togglePanel());
-    if (matchMedia('(max-width: 720px)').matches || window.self !== window.top) this.togglePanel();
+    if (matchMedia('(max-width: 720px), (max-height: 420px)').matches || window.self !== window.top) this.togglePanel();
     document.addEventListener('keydown', event => this.key(event));
     new ResizeObserver(() => { if (!this.camera.touched) this.fit(); this.dirty = true; }).observe(this.canvas);
   }
@@ -62,6 +62,7 @@ class Replay {
 
   key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === 'SELECT') return;
+    if (event.key === ' ' && ['BUTTON', 'SUMMARY'].includes(event.target.tagName)) return;  // it is pressed
     const {player} = this, far = event.shiftKey ? 10 : 1;
     const actions = {
       ' ': () => player.toggle(), ArrowLeft: () => player.seek(player.time - far), ArrowRight: () => player.seek(player.time + far),

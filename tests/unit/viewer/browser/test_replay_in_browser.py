@@ -1,6 +1,5 @@
 """The replay opens from disk in a real browser, without network and without an error, and something is drawn."""
 
-import asyncio
 import io
 from dataclasses import replace
 
@@ -22,7 +21,6 @@ def test_a_replay_opens_from_disk_and_plays(chromium, hill_recording, tmp_path):
         await page.open((tmp_path / "replay.html").as_uri())
         await page.wait_for(DRAWN)
         await page.wait_for("Number(document.querySelector('input').value) > 1.0")  # the time bar moves
-        await asyncio.sleep(1.0)
         return page.errors, page.requests, await page.screenshot()
 
     errors, requests, png = chromium.visit(watch)
@@ -50,12 +48,21 @@ def test_a_replay_reports_the_state_of_the_tree_along_its_time_bar(chromium, hil
         await page.read("▶ get there")
         await page.read("✗ plan walled in")
         await page.read("get_path SUCCESS: plan found")
-        return page.errors, await page.screenshot()
+        before = await page.evaluate("replay.player.playing")
+        await page.evaluate("document.querySelector('summary').focus()")
+        await page.key(" ")
+        await page.wait_for("!document.querySelector('details').open")
+        await page.evaluate("document.querySelector('#panel-button').focus()")
+        await page.key(" ")
+        await page.wait_for("document.querySelector('#panel').classList.contains('closed')")
+        playing = [before, await page.evaluate("replay.player.playing")]
+        return page.errors, playing, await page.screenshot()
 
-    errors, png = chromium.visit(watch)
+    errors, playing, png = chromium.visit(watch)
 
     (tmp_path / "screenshot.png").write_bytes(png)
     assert errors == []
+    assert playing == [True, True], "space presses what has the focus"
 
 
 def test_a_click_on_an_incident_takes_the_time_bar_to_it(chromium, hill_recording, tmp_path):
@@ -129,19 +136,33 @@ def test_controls_of_a_phone_lie_beside_the_scene(chromium, two_robots, tmp_path
     rest = """[document.documentElement.scrollWidth,
       [...document.querySelectorAll('.pin b')].map(pin => pin.textContent)]"""
 
+    panel = "document.querySelector('#panel').clientWidth"
+
     async def watch(page):
         await page.resize(390, 844)
         await page.open((tmp_path / "replay.html").as_uri())
         await page.wait_for("window.replay !== undefined && window.replay.used !== undefined")
-        return page.errors, await page.evaluate(boxes), await page.evaluate(rest)
+        upright = await page.evaluate(boxes), await page.evaluate(rest)
+        await page.resize(844, 390)
+        await page.open((tmp_path / "replay.html").as_uri() + "?sideways")
+        await page.wait_for("window.replay !== undefined && window.replay.used !== undefined")
+        closed, sideways = await page.evaluate(panel), await page.evaluate(boxes)
+        await page.press("☰")
+        opened = await page.evaluate(panel)
+        (tmp_path / "sideways.png").write_bytes(await page.screenshot())
+        return page.errors, upright, (closed, opened, sideways)
 
-    errors, (scene, header, footer), (width, names) = chromium.visit(watch)
+    errors, ((scene, header, footer), (width, names)), (closed, opened, sideways) = chromium.visit(watch)
 
     assert errors == []
     assert width == 390, "nothing stands out to the side"
     assert header[1] <= scene[0] and scene[1] <= footer[0] and footer[1] <= 844
     assert scene[1] - scene[0] > 0.75 * 844
     assert names == ["a start", "a goal", "b start", "b goal", "a", "b"]
+    scene, header, footer = sideways
+    assert 15 < header[1] <= scene[0] and scene[1] <= footer[0] and footer[1] <= 390
+    assert scene[1] - scene[0] > 0.7 * 390, "the panel is closed until it is wanted, and is beside the scene"
+    assert closed == 0 and 200 < opened < 300
 
 
 def test_a_frame_of_three_hundred_thousand_triangles_stays_within_its_budget(chromium, large_recording, tmp_path):
