@@ -12,6 +12,8 @@ PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "mbf_ros", "terra
 READ_BY_NAME = {
     ("NavigationParameters", "restore_defaults"): "taken out of the changes before they are applied",
     ("CriticParameters", None): "one block for each critic, read in the order of the table of critics",
+    ("RunRow", None): "the form of a file of results, whose rows are read as mappings",
+    ("ResultsFile", None): "the form of a file of results, whose head is read as a mapping",
 }
 
 

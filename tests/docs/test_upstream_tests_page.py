@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "upstream_tests.md").read_text("utf-8")
 ALL = frozenset(range(1, 358))
 
-# Case "F227a" names a fact, "f028a8aaba70" is a hash.
+# A fact may have a letter, for a case of it; a hash goes on with four digits or letters at least.
 ONE = re.compile(r"(?<![A-Za-z0-9])[Ff](\d{3})(?!\d|[a-f][0-9a-f]{4})")
 RANGE = re.compile(r"[Ff](\d{3})(?:-|_to_)[Ff](\d{3})")
 
