@@ -69,7 +69,7 @@ class Robot(Node):
         if "odom" not in self.silent:
             self.odom.publish(self.odometry())
         if "scan" not in self.silent:
-            self.scan.publish(self.empty_scan())
+            self.scan.publish(self.scan_of_a_wall())
 
     def transform(self):
         transform = TransformStamped(child_frame_id="base_link")
@@ -85,10 +85,10 @@ class Robot(Node):
         odometry.twist.twist = self.command
         return odometry
 
-    def empty_scan(self):
-        scan = LaserScan(angle_min=-1.5, angle_max=1.5, angle_increment=0.1, range_min=0.1, range_max=5.0)
+    def scan_of_a_wall(self):
+        scan = LaserScan(angle_min=1.4, angle_max=1.7, angle_increment=0.1, range_min=0.1, range_max=5.0)
         scan.header.frame_id, scan.header.stamp = "base_link", self.stamp()
-        scan.ranges = [math.inf] * 31
+        scan.ranges = [4.0] * 4  # a wall on its left
         return scan
 
     def listen(self):
