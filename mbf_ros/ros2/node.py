@@ -15,16 +15,10 @@ from typing import Any
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
-from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.goals.goal_types import MoveBaseGoal
-from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.server.factory import read_config
-from mbf_abstract.session import NavigationSession
-from mbf_abstract.time.clock import WallClock, unix_seconds
-from mbf_abstract.time.ticker import Ticker
-from mbf_ros.messages.geometry import NANOSECONDS, MessageContext
+from mbf_abstract.time.clock import unix_seconds
+from mbf_ros.messages.geometry import NANOSECONDS
+from mbf_ros.robot_inputs import ODOM, RobotInputs
 from mbf_ros.ros2.actions import ACTIONS, ServedAction, Serving
 from mbf_ros.ros2.clock import RosClock, SimulatedRosClock
 from mbf_ros.ros2.conversion import interface_class
@@ -32,15 +26,15 @@ from mbf_ros.ros2.nav2 import offers_names, serve_actions
 from mbf_ros.ros2.nav2_services import Nav2Services
 from mbf_ros.ros2.options import NodeOptions
 from mbf_ros.ros2.parameters import NodeParameters
-from mbf_ros.ros2.robot import Arrivals, Frames, RosRobot
+from mbf_ros.ros2.robot import Arrivals, Frames
+from mbf_ros.ros2.robot_navigation import WATCH_PERIOD, RobotNavigation
 from mbf_ros.ros2.running import RosError, Spinner, ros_2
 from mbf_ros.ros2.services import ServedQueries
-from mbf_ros.ros2.topics import ODOM, CommandTopic, Inputs, Outputs
+from mbf_ros.ros2.topics import CommandTopic, Inputs, Outputs
+from mbf_ros.sensor_options import used_sensors
 
 NODE = "move_base_flex"
 CLOCK = "/clock"
-COMPILING = "compiling kernels"
-WATCH_PERIOD = 0.05  # s of real time between two looks at what fails to come
 CALENDAR_PERIOD = 0.1  # s between two looks at the calendar
 CLIENT_PERIOD = 0.5  # s of real time between two looks at who is gone
 
@@ -66,7 +60,7 @@ def navigation_node(file: Path, options: NodeOptions | None = None) -> Iterator[
         yield node
 
 
-class NavigationNode:
+class NavigationNode(RobotNavigation):
     """The node; made by ``navigation_node``.
 
     Attributes
@@ -75,14 +69,15 @@ class NavigationNode:
         Why the node has ended by itself; empty while it runs.
     """
 
+    name, time_name = "node", "ROS time"
+
     def __init__(self, options: NodeOptions) -> None:
         import rclpy
 
+        super().__init__(options.max_silence, options.time_to_end)
         self._options = options
         self.failure = ""
-        self._ending, self._failed, self._ready = threading.Event(), threading.Event(), threading.Event()
-        self._closing = ExitStack()
-        self._real_time = WallClock()
+        self._failed = threading.Event()
         self._arrivals = Arrivals(self._real_time.now)
         self._node: Any = rclpy.create_node(NODE)
         self._closing.callback(self._node.destroy_node)
@@ -93,53 +88,27 @@ class NavigationNode:
         """Wait until the node fails, at most so long; returns whether it has."""
         return self._failed.wait(seconds)
 
-    def problem(self) -> str:
-        """What does not come from the robot, or is not ready here; empty if a goal can be driven."""
-        return self._robot.problem() or ("" if self._ready.is_set() else COMPILING)
-
     def serve(self, server_class: Any, config: Config) -> None:
         """Make the navigator and everything that is seen of it; waits for ``/clock`` with ``use_sim_time``."""
         self._frames = Frames(config.parameters.global_frame, config.parameters.robot_frame)
-        self._clock = clock = self._make_clock()
-        self._session = session = NavigationSession(clock)
-        self._closing.callback(session.close)
-        transforms = TransformBuffer(config.parameters.tf_cache_time)
-        commands = CommandTopic(
-            self._node, self._options.stamped_commands, self._frames.robot_frame, clock, self._context
-        )
-        robot = RosRobot(commands.publish, transforms, clock, self._arrivals, self._frames, self._max_silence)
-        self._robot, self._transforms = robot, transforms
-        server = session.serve(server_class, config, robot, transforms)
-        self._closing.callback(commands.wait_until_sent, self._options.time_to_send)
-        self._closing.callback(server.runtime.gate.close, "the node ends")
+        self._clock = self._make_clock()
+        stamped, robot_frame = self._options.stamped_commands, self._frames.robot_frame
+        commands = CommandTopic(self._node, stamped, robot_frame, self._clock, self._context)
+        self._make_navigator(server_class, config, commands, self._options.time_to_send)
+        server = self.session.navigator.server
         NodeParameters(self._node, server)
         self._open_topics(config)
         serving = Serving(self._send, self._context, self._refusal, self._fail)
         self._actions = [ServedAction(self._node, f"~/{name}", *action, serving) for name, action in ACTIONS.items()]
-        self._closing.callback(self._stop_serving)
         if not self._options.keep_goals:
             self._repeat(CLIENT_PERIOD, self._cancel_abandoned)
         queries = ServedQueries(self._node, server, self._context)
         if offers_names(self._node, self._options.nav2, self._real_time):
             self._actions += serve_actions(self._node, server, serving)
             Nav2Services(self._node, server, serving, queries, self._options.stands_for_amcl)
-        clock.on_jump.append(self._on_jump)
-        watch = Ticker(self._real_time, session.events, self._stop_where_silent, WATCH_PERIOD, "silence watch")
-        self._closing.callback(watch.stop)
-        self._real_time.spawn(self._get_ready, "warm up")
-
-    def close(self) -> None:
-        """Stop the robot, end the goals and leave the graph; once."""
-        self._closing.close()
+        self._begin()
 
     # ------------------------------------------------------------------------------------------- parts
-    def _context(self) -> MessageContext:
-        return MessageContext(self._frames.global_frame, self._clock.epoch)
-
-    def _max_silence(self) -> float:
-        given = self._options.max_silence
-        return self._session.navigator.server.runtime.parameters.command_timeout if given is None else given
-
     def _make_clock(self) -> RosClock:
         if not self._node.get_parameter("use_sim_time").value:
             clock = RosClock(unix_seconds())
@@ -175,77 +144,44 @@ class NavigationNode:
         return clocks[0]
 
     def _open_topics(self, config: Config) -> None:
-        navigator = self._session.navigator
-        self._outputs = Outputs(self._node, navigator, self._context)
-        self._closing.callback(self._outputs.close)
-        inputs = Inputs(self._node, self._clock, self._context, self._arrivals)
-        inputs.listen_to_robot(self._robot, self._transforms, config.parameters.use_odometry)
-        inputs.listen_to_sensors(navigator, self._options.sensors)
-        inputs.listen_to_goals(self._send, self._refusal)
-
-    def _get_ready(self) -> None:
-        """Compile all kernels once the robot is heard, then take goals: no goal waits for a compiler."""
-        while self._robot.problem():
-            if self._ending.wait(WATCH_PERIOD):
-                return
-        server = self._session.navigator.server
-        try:
-            start = server.runtime.robot.pose()
-            ahead = Pose.planar(1.0, 0.0, frame_id=self._frames.robot_frame)
-            server.warm_up(start, Transform.from_pose(start, self._frames.robot_frame).apply_to_pose(ahead))
-        except Exception as error:  # of a plugin, or of a robot that fell silent: a goal will say more
-            self._node.get_logger().warning(f"warming up: {type(error).__name__}: {error_text(error)}")
-        self._ready.set()
-
-    def _refusal(self) -> str:
-        """Why no goals are taken; empty if they are."""
-        if self._ending.is_set():
-            return "the node ends"
-        return "" if self._ready.is_set() else "the node is not ready"
-
-    def _send(self, goal: Any) -> AnyGoalHandle:
-        if isinstance(goal, MoveBaseGoal):
-            self._outputs.show_goal(goal)
-        return self._session.navigator.send(goal)
+        navigator = self.session.navigator
+        self._shown = Outputs(self._node, navigator, self._context)
+        self._closing.callback(self._shown.close)
+        inputs = RobotInputs(self._clock.now, self._context, self._arrivals.hear)
+        uses_odometry = config.parameters.use_odometry
+        self._forget_arrivals()
+        sensors = used_sensors(self._options.sensors, navigator.server.listens_to, self._warn)
+        listening = Inputs(self._node)
+        listening.listen(inputs.of_robot(self._robot, self._transforms, uses_odometry))
+        listening.listen(inputs.of_sensors(navigator.server.take_scan, sensors))
+        listening.listen(inputs.of_users(self._send, self._refusal))
 
     # ------------------------------------------------------------------------------------------- watching
-    def _stop_where_silent(self) -> None:
-        if problem := self._robot.problem():
-            self._session.navigator.server.runtime.gate.ask_stop(problem)
+    def _warn(self, text: str) -> None:
+        self._node.get_logger().warning(text)
+
+    def _begin_to_take_goals(self) -> None:
+        """Nothing: goals that come before are refused."""
+
+    def _forget_arrivals(self) -> None:
+        if self.session.navigator.server.config.parameters.use_odometry:
+            self._arrivals.expect(ODOM)
+
+    def _abort_goals(self, text: str) -> None:
+        for action in self._actions:
+            action.abort_all(text)
 
     def _cancel_abandoned(self) -> None:
         for action in self._actions:
             action.cancel_abandoned()
 
-    def _on_jump(self, difference: float) -> None:
-        """End what was begun before ROS time jumped, and forget where frames were; static ones stay."""
-        text = f"ROS time jumped by {difference:+.3f} s"
-        self._node.get_logger().warning(text)
-        static = [one for one in self._transforms.newest() if one.static]
-        self._transforms.clear()
-        for one in static:
-            self._transforms.set(one)
-        if self._session.navigator.server.config.parameters.use_odometry:
-            self._arrivals.expect(ODOM)
-        for action in self._actions:
-            action.abort_all(text)
-        self._session.navigator.server.cancel_all(text)
+    def _wait_for_results(self) -> bool:
+        return any(action.unfinished for action in self._actions) and not self._spinner.join(WATCH_PERIOD)
 
     def _fail(self, error: BaseException) -> None:
         """Stop the robot for good because of a fault of ours; the node ends."""
         self.failure = f"{type(error).__name__}: {error_text(error)}"
-        if hasattr(self, "_session") and hasattr(self._session, "navigator"):
-            self._session.events.emit(EventKind.FAULT, NODE, type=type(error).__name__, message=self.failure)
-            self._session.navigator.server.runtime.gate.close(f"a callback raised {self.failure}")
+        if hasattr(self, "session") and hasattr(self.session, "navigator"):
+            self.session.events.emit(EventKind.FAULT, NODE, type=type(error).__name__, message=self.failure)
+            self.session.navigator.server.runtime.gate.close(f"a callback raised {self.failure}")
         self._failed.set()
-
-    # ------------------------------------------------------------------------------------------- the end
-    def _stop_serving(self) -> None:
-        """Take no more goals, end those that run, and let their results be sent."""
-        self._ending.set()
-        self._session.navigator.server.runtime.gate.close("the node ends")
-        self._session.navigator.server.cancel_all("the node ends")
-        deadline = self._real_time.now() + self._options.time_to_end
-        while any(action.unfinished for action in self._actions) and self._real_time.now() < deadline:
-            if self._spinner.join(WATCH_PERIOD):
-                break

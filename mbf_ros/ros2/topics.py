@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from mbf_abstract.event_values import error_text
 from mbf_abstract.geometry import Command, Path
-from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.navigator import Navigator
@@ -16,22 +14,18 @@ from mbf_abstract.time.clock import Clock
 from mbf_ros.messages.geometry import (
     MessageContext,
     command_twist,
-    odometry_of,
     path_message,
-    pose_of,
     pose_stamped,
-    transforms_of,
     twist,
     twist_stamped,
 )
-from mbf_ros.messages.interfaces import Message, MessageError
-from mbf_ros.messages.sensors import SENSORS
+from mbf_ros.messages.interfaces import MessageError
+from mbf_ros.robot_inputs import Input, Quality
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
-from mbf_ros.ros2.robot import Arrivals, RosRobot
-from mbf_ros.sensor_options import used_sensors
 
-ODOM, TF, TF_STATIC, CMD_VEL = "odom", "/tf", "/tf_static", "cmd_vel"
-GOAL_TOPICS = ("goal_pose", "move_base_simple/goal")
+CMD_VEL = "cmd_vel"
+DEPTH = 100
+"""How many messages of a topic wait to be taken."""
 WARN_PERIOD = 5.0  # s between two warnings about messages of one topic
 
 
@@ -62,68 +56,32 @@ class CommandTopic:
 class Inputs:
     """Subscriptions; a message that means nothing is dropped with a warning."""
 
-    def __init__(self, node: Any, clock: Clock, context: Callable[[], MessageContext], arrivals: Arrivals) -> None:
+    def __init__(self, node: Any) -> None:
         from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 
-        self._node, self._clock, self._context, self._arrivals = node, clock, context, arrivals
-        self._sensor_data = qos_profile_sensor_data
-        self._many = QoSProfile(depth=100)
-        self._latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._node = node
+        self._qualities = {
+            Quality.SENSOR_DATA: qos_profile_sensor_data,
+            Quality.MANY: QoSProfile(depth=DEPTH),
+            Quality.LATCHED: QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL),
+        }
 
-    def listen_to_robot(self, robot: RosRobot, transforms: TransformBuffer, uses_odometry: bool) -> None:
-        """Take odometry and transforms."""
+    def listen(self, inputs: Iterable[Input]) -> None:
+        """Subscribe topics."""
+        for one in inputs:
+            kind, quality = interface_class(one.type), self._qualities[one.quality]
+            self._node.create_subscription(kind, one.topic, self._taking(one), quality)
 
-        def take_odometry(message: Message) -> None:
-            robot.take_odometry(odometry_of(message, self._context(), self._clock.now()))
-            self._arrivals.hear(ODOM)
-
-        def take_transforms(message: Message, static: bool = False) -> None:
-            for transform in transforms_of(message, self._context(), self._clock.now(), static):
-                transforms.set(transform)
-
-        if uses_odometry:
-            self._arrivals.expect(ODOM)
-            self._subscribe(ODOM, "nav_msgs/Odometry", take_odometry, self._sensor_data)
-        self._subscribe(TF, "tf2_msgs/TFMessage", take_transforms, self._many)
-        self._subscribe(TF_STATIC, "tf2_msgs/TFMessage", lambda one: take_transforms(one, True), self._latched)
-
-    def listen_to_sensors(self, navigator: Navigator, chosen: Mapping[str, tuple[str, str]]) -> None:
-        """Feed sensors that a map listens to into it: type of ``sensors.SENSORS`` and source, by topic."""
-        used = used_sensors(chosen, navigator.server.listens_to, self._node.get_logger().warning)
-        for topic, (kind, source) in used.items():
-            take = self._sensor(navigator, topic, kind, source)
-            self._subscribe(topic, kind, take, self._sensor_data)
-
-    def listen_to_goals(self, send: Callable[[MoveBaseGoal], AnyGoalHandle], refusal: Callable[[], str]) -> None:
-        """Drive to the poses of the goal topics, unless there is a refusal; a newer one takes the older over."""
-
-        def go_to(message: Message) -> None:
-            if reason := refusal():
-                raise MessageError(reason)
-            handle = send(MoveBaseGoal(pose_of(message, self._context(), "goal").stamped(0.0)))
-            if handle.done and handle.result is not None:
-                raise MessageError(handle.result.message)
-
-        for topic in GOAL_TOPICS:
-            self._subscribe(topic, "geometry_msgs/PoseStamped", go_to, self._many)
-
-    def _sensor(self, navigator: Navigator, topic: str, kind: str, source: str) -> Callable[[Message], None]:
-        def take(message: Message) -> None:
-            navigator.server.take_scan(SENSORS[kind](message, self._context(), source, self._clock.now()))
-            self._arrivals.hear(topic)
-
-        return take
-
-    def _subscribe(self, topic: str, type_name: str, take: Callable[[Message], None], quality: Any) -> None:
+    def _taking(self, one: Input) -> Callable[[Any], None]:
         logger = self._node.get_logger()
 
         def on_message(message: Any) -> None:
             try:
-                take(to_dict(message))
-            except (ValueError, TransformError) as error:
-                logger.warning(f"{topic}: {error_text(error)}", throttle_duration_sec=WARN_PERIOD)
+                one.take(to_dict(message))
+            except MessageError as error:
+                logger.warning(f"{one.topic}: {error_text(error)}", throttle_duration_sec=WARN_PERIOD)
 
-        self._node.create_subscription(interface_class(type_name), topic, on_message, quality)
+        return on_message
 
 
 class Outputs:

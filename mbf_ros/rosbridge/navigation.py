@@ -7,15 +7,16 @@ from collections.abc import Callable
 from typing import Any
 
 from mbf_abstract.config.navigation_parameters import NavigationParameters
-from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.navigator import Navigator
 from mbf_ros.messages import mbf_actions, nav2_actions, nav2_waypoints
 from mbf_ros.messages.action_mapping import ActionMapping
-from mbf_ros.messages.geometry import MessageContext, pose_of
-from mbf_ros.messages.interfaces import Message, MessageError, json_text
+from mbf_ros.messages.geometry import MessageContext
+from mbf_ros.messages.interfaces import Message, json_text
 from mbf_ros.messages.mbf_queries import MAP_QUESTIONS, MapQuestion
+from mbf_ros.robot_inputs import RobotInputs
 from mbf_ros.rosbridge.actions import ServedAction
 from mbf_ros.rosbridge.bridge import Bridge
+from mbf_ros.rosbridge.protocol import absolute
 from mbf_ros.rosbridge.services import Service
 
 NODE = "/move_base_flex"
@@ -31,7 +32,6 @@ ACTIONS: dict[str, ActionMapping[Any, Any]] = {
     "/follow_waypoints": nav2_waypoints.FOLLOW_WAYPOINTS,
     "/smooth_path": nav2_actions.SMOOTH_PATH,
 }
-GOAL_TOPICS = ("/goal_pose", "/move_base_simple/goal")
 
 
 def serve_navigator(bridge: Bridge, navigator: Navigator, context: MessageContext) -> None:
@@ -39,8 +39,9 @@ def serve_navigator(bridge: Bridge, navigator: Navigator, context: MessageContex
     for name, mapping in ACTIONS.items():
         bridge.actions.actions[name] = ServedAction(mapping, navigator.send)
         bridge.services.services[f"{name}/_action/cancel_goal"] = _cancel_service(bridge, name)
-    for name in GOAL_TOPICS:
-        bridge.topics.add_input(name, "geometry_msgs/PoseStamped", lambda message: _go_to(navigator, message, context))
+    inputs = RobotInputs(navigator.server.runtime.clock.now, lambda: context)
+    for one in inputs.of_users(navigator.send):
+        bridge.topics.add_input(absolute(one.topic), one.type, one.take)
     for name, question in MAP_QUESTIONS.items():
         bridge.services.services[f"{NODE}/{name}"] = _map_service(navigator, question, context)
     server = navigator.server
@@ -81,14 +82,6 @@ class ServerParameters:
 def _key(name: str) -> str:
     """Name of a parameter without its node, whether ROS 1 or ROS 2 has put the two together."""
     return name.removeprefix(NODE).lstrip("/:.")
-
-
-def _go_to(navigator: Navigator, message: Message, context: MessageContext) -> None:
-    """Send the goal of a topic; it belongs to no client, and a newer one takes it over."""
-    pose = pose_of(message, context, "goal")
-    handle = navigator.send(MoveBaseGoal(pose.stamped(0.0)))
-    if handle.done and handle.result is not None:
-        raise MessageError(handle.result.message)
 
 
 def _map_service(navigator: Navigator, question: MapQuestion, context: MessageContext) -> Service:

@@ -17,17 +17,10 @@ from mbf_abstract.commands.check import check_config
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
-from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.goals.goal_types import MoveBaseGoal
-from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.server.factory import read_config
-from mbf_abstract.session import NavigationSession
-from mbf_abstract.time.clock import WallClock
-from mbf_abstract.time.ticker import Ticker
-from mbf_ros.messages.geometry import MessageContext
-from mbf_ros.ros2.robot import Frames, RosRobot
+from mbf_ros.robot_inputs import RobotInputs
+from mbf_ros.ros2.robot import Frames
+from mbf_ros.ros2.robot_navigation import WATCH_PERIOD, RobotNavigation
 from mbf_ros.rosbridge_robot.dialing import check_address
 from mbf_ros.rosbridge_robot.goals import OfferedGoals
 from mbf_ros.rosbridge_robot.links import LinkArrivals, RobotLinks
@@ -37,9 +30,7 @@ from mbf_ros.rosbridge_robot.robot_time import RobotTime
 from mbf_ros.rosbridge_robot.topics import Reports, RobotTopics
 from mbf_ros.sensor_options import used_sensors
 
-COMPILING = "compiling kernels"
 REMINDER_PERIOD = 5.0  # s between two reports that the robot's time is not known
-WATCH_PERIOD = 0.05  # s of real time between two looks at what fails to come
 NOTED = "robot link"
 Report = Callable[[str], None]
 
@@ -75,19 +66,15 @@ def connect_navigator(
         yield made
 
 
-class RobotNavigator:
-    """A navigator and its connections; made by ``connect_navigator``.
+class RobotNavigator(RobotNavigation):
+    """A navigator and its connections; made by ``connect_navigator``."""
 
-    Attributes
-    ----------
-    session : NavigationSession
-    """
-
-    session: NavigationSession
+    name, time_name = "navigator", "the robot's time"
+    _shown: ShownTopics
 
     def __init__(self, address: str, options: RobotOptions, report: Report) -> None:
+        super().__init__(options.max_silence, options.time_to_end)
         self._options, self._take_report = options, report
-        self._real_time = WallClock()
         self._reports = Reports(self._real_time.now, self._report)
         self._links = RobotLinks(
             address,
@@ -103,50 +90,22 @@ class RobotNavigator:
         self._links.handlers["publish"] = self._topics.take
         self._time = RobotTime(options.time, self._real_time, self._arrivals)
         self._time.listen(self._topics)
-        self._ending, self._ready, self._served = threading.Event(), threading.Event(), threading.Event()
-        self._closing = ExitStack()
+        self._served = threading.Event()
         self._closing.callback(self._links.close)
-
-    def problem(self) -> str:
-        """What does not come from the robot, or is not ready here; empty if a goal can be driven."""
-        return self._robot.problem() or ("" if self._ready.is_set() else COMPILING)
 
     def serve(self, server_class: Any, config: Config) -> None:
         """Connect, and make the navigator; waits for the robot's time where its messages show that."""
         self._frames = Frames(config.parameters.global_frame, config.parameters.robot_frame)
         self._links.open_data()
         self._clock = clock = self._robot_clock()
-        self.session = session = NavigationSession(clock)
-        self._closing.callback(session.close)
-        self._transforms = TransformBuffer(config.parameters.tf_cache_time)
         stamped, frame_id = self._options.stamped_commands, self._frames.robot_frame
         self._command_topic = CommandTopic(lambda: self._links.commands, stamped, frame_id, clock, self._context)
-        self._robot = RosRobot(
-            self._command_topic.publish, self._transforms, clock, self._arrivals, self._frames, self._max_silence
-        )
-        server = session.serve(server_class, config, self._robot, self._transforms)
-        self._closing.callback(self._links.commands.wait_until_sent, self._options.time_to_send)
-        self._closing.callback(server.runtime.gate.close, "the navigator ends")
+        self._make_navigator(server_class, config, self._command_topic, self._options.time_to_send)
         self._links.commands.open()
         self._listen(config)
-        clock.on_jump.append(self._on_jump)
-        watch = Ticker(self._real_time, session.events, self._watch, WATCH_PERIOD, "silence watch")
-        self._closing.callback(watch.stop)
-        self._closing.callback(self._stop_serving)
-        self._real_time.spawn(self._get_ready, "warm up")
-
-    def close(self) -> None:
-        """Stop the robot, end the goals and the connections; once."""
-        self._closing.close()
+        self._begin()
 
     # ------------------------------------------------------------------------------------------- parts
-    def _context(self) -> MessageContext:
-        return MessageContext(self._frames.global_frame, self._clock.epoch)
-
-    def _max_silence(self) -> float:
-        given = self._options.max_silence
-        return self.session.navigator.server.runtime.parameters.command_timeout if given is None else given
-
     def _robot_clock(self) -> Any:
         """The clock on the robot's time; waits until that is known."""
         while (clock := self._time.clock(REMINDER_PERIOD)) is None:
@@ -158,42 +117,18 @@ class RobotNavigator:
         self._shown = ShownTopics(lambda: self._links.data, navigator, self._context)
         self._closing.callback(self._shown.close)
         self._goals = OfferedGoals(lambda: self._links.data, self._send, self._context)
-        self._topics.listen_to_robot(self._robot, self._transforms, config.parameters.use_odometry)
+        inputs = RobotInputs(self._clock.now, self._context, self._topics.hear)
+        uses_odometry = config.parameters.use_odometry
         sensors = used_sensors(self._options.sensors, navigator.server.listens_to, self._report)
-        self._topics.listen_to_sensors(navigator.server.take_scan, sensors, self._options.cloud_period)
-        self._topics.listen_to_goals(self._send, self._refusal)
+        self._topics.listen_to(inputs.of_robot(self._robot, self._transforms, uses_odometry))
+        self._topics.listen_to(inputs.of_sensors(navigator.server.take_scan, sensors), self._options.cloud_period)
+        self._topics.listen_to(inputs.of_users(self._send, self._refusal))
         self._links.handlers |= {
             "send_action_goal": self._goals.take_goal,
             "cancel_action_goal": self._goals.take_cancel,
         }
         self._served.set()
         self._links.post([*self._topics.requests(), *self._shown.greeting()])
-
-    def _get_ready(self) -> None:
-        """Compile all kernels once the robot is heard, then offer the actions: no goal waits for a compiler."""
-        while self._robot.problem():
-            if self._ending.wait(WATCH_PERIOD):
-                return
-        server = self.session.navigator.server
-        try:
-            start = server.runtime.robot.pose()
-            ahead = Pose.planar(1.0, 0.0, frame_id=self._frames.robot_frame)
-            server.warm_up(start, Transform.from_pose(start, self._frames.robot_frame).apply_to_pose(ahead))
-        except Exception as error:  # of a plugin, or of a robot that fell silent: a goal will say more
-            self._report(f"warming up: {type(error).__name__}: {error_text(error)}")
-        self._ready.set()
-        self._links.post(OfferedGoals.offers())
-
-    def _refusal(self) -> str:
-        """Why no goals are taken; empty if they are."""
-        if self._ending.is_set():
-            return "the navigator ends"
-        return "" if self._ready.is_set() else "not ready for goals yet"
-
-    def _send(self, goal: Any) -> AnyGoalHandle:
-        if isinstance(goal, MoveBaseGoal):
-            self._shown.show_goal(goal)
-        return self.session.navigator.send(goal)
 
     # ------------------------------------------------------------------------------------------- the connections
     def _data_greeting(self) -> list[str]:
@@ -226,32 +161,30 @@ class RobotNavigator:
             self.session.events.emit(kind, NOTED, message=text)
 
     # ------------------------------------------------------------------------------------------- watching
+    def _warn(self, text: str) -> None:
+        self._note(EventKind.CUSTOM, text)
+
+    def _begin_to_take_goals(self) -> None:
+        self._links.post(OfferedGoals.offers())
+
+    def _forget_arrivals(self) -> None:
+        self._topics.lost()
+
+    def _abort_goals(self, text: str) -> None:
+        self._goals.abort_all(text)
+
     def _watch(self) -> None:
         self._time.follow_calendar()
-        if self._links.commands.problem:
-            return  # zero cannot be sent; the gate tries again every command_timeout
-        if problem := self._robot.problem():
-            self.session.navigator.server.runtime.gate.ask_stop(problem)
-
-    def _on_jump(self, difference: float) -> None:
-        """End what was begun before the robot's time jumped, and forget where frames were; static ones stay."""
-        text = f"the robot's time jumped by {difference:+.3f} s"
-        self._note(EventKind.CUSTOM, text)
-        static = [one for one in self._transforms.newest() if one.static]
-        self._transforms.clear()
-        for one in static:
-            self._transforms.set(one)
-        self._topics.lost()
-        self._goals.abort_all(text)
-        self.session.navigator.server.cancel_all(text)
+        if not self._links.commands.problem:  # else zero cannot be sent; the gate tries again every command_timeout
+            super()._watch()
 
     # ------------------------------------------------------------------------------------------- the end
+    def _wait_for_results(self) -> bool:
+        if not self._goals.unfinished or self._links.data.problem:
+            return False
+        self._real_time.sleep(WATCH_PERIOD)
+        return True
+
     def _stop_serving(self) -> None:
-        """Take no more goals, end those that run, and let their results be sent."""
-        self._ending.set()
-        self.session.navigator.server.runtime.gate.close("the navigator ends")
-        self.session.navigator.server.cancel_all("the navigator ends")
-        deadline = self._real_time.now() + self._options.time_to_end
-        while self._goals.unfinished and not self._links.data.problem and self._real_time.now() < deadline:
-            self._real_time.sleep(WATCH_PERIOD)
+        super()._stop_serving()
         self._links.data.wait_until_sent(self._options.time_to_send)

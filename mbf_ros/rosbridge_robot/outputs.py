@@ -41,6 +41,10 @@ class CommandTopic:
         """Publish a command; does not wait. Raises NotConnectedError."""
         self._connection().newest(CMD_VEL, self._publication(command))
 
+    def wait_until_sent(self, seconds: float) -> None:
+        """Wait until the last command has left, for at most ``seconds``."""
+        self._connection().wait_until_sent(seconds)
+
     def greeting(self) -> list[str]:
         """Return the frames with which each connection begins."""
         kind = "geometry_msgs/TwistStamped" if self._stamped else "geometry_msgs/Twist"

@@ -14,11 +14,14 @@ from collections import deque
 from mbf_abstract.time.clock import Clock, unix_seconds
 from mbf_ros.messages.geometry import NANOSECONDS
 from mbf_ros.messages.interfaces import Message
+from mbf_ros.robot_inputs import ODOM
 from mbf_ros.ros2.clock import JUMP, RosClock, SimulatedRosClock
 from mbf_ros.ros2.robot import Arrivals
+from mbf_ros.rosbridge.protocol import absolute
 from mbf_ros.rosbridge_robot.options import TimeSource
-from mbf_ros.rosbridge_robot.topics import CLOCK, ODOM, RobotTopics
+from mbf_ros.rosbridge_robot.topics import RobotTopics
 
+CLOCK = "/clock"
 CONTRADICTIONS = 3
 """How many messages in a row must agree, and differ from the estimate by more than ``JUMP``, to replace it."""
 CONTRADICTION_TIME = 0.5
@@ -89,7 +92,7 @@ class RobotTime:
         if self.source is TimeSource.SIMULATED:
             topics.listen(CLOCK, "rosgraph_msgs/Clock", self._take_clock)
         elif self.source is TimeSource.ODOM:
-            topics.listen(ODOM, "nav_msgs/Odometry", self._take_odometry)
+            topics.listen(absolute(ODOM), "nav_msgs/Odometry", self._take_odometry)
 
     def clock(self, seconds: float) -> RosClock | None:
         """Return the clock once the time is known; None where it is not within ``seconds``."""

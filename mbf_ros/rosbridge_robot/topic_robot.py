@@ -8,21 +8,18 @@ when commands stop coming.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Command
-from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.time.clock import Clock
-from mbf_ros.messages.geometry import MessageContext, odometry_of, transforms_of
-from mbf_ros.messages.interfaces import Message, MessageError
-from mbf_ros.messages.sensors import SENSORS
+from mbf_ros.messages.geometry import MessageContext
+from mbf_ros.robot_inputs import ODOM, RobotInputs
 from mbf_ros.ros2.robot import Arrivals, Frames, RosRobot
+from mbf_ros.rosbridge.protocol import absolute
 from mbf_ros.rosbridge.topics import TopicTable
 
-ODOM = "/odom"
 WATCH_PERIOD = 0.05  # s between two looks at what fails to come
 
 
@@ -57,9 +54,9 @@ class TopicRobot:
     ) -> None:
         self.on_command: list[Callable[[Command], None]] = []
         self._transforms, self._now = transforms, clock.now
-        self._arrivals = Arrivals(clock.now)
+        self._arrivals, self._uses_odometry = Arrivals(clock.now), uses_odometry
         if uses_odometry:
-            self._arrivals.expect(ODOM)
+            self._arrivals.expect(absolute(ODOM))
         self._watched = RosRobot(self._publish, transforms, clock, self._arrivals, frames, max_silence)
 
     def send_command(self, command: Command) -> None:
@@ -93,38 +90,15 @@ class TopicRobot:
             Type of ``sensors.SENSORS``, and source in the configuration, by the topics of the sensors.
         """
 
-        def take_odometry(message: Message) -> None:
-            self._watched.take_odometry(odometry_of(message, context, self._now()))
-            self._arrivals.hear(ODOM)
+        def hear(topic: str) -> None:
+            if topic not in sensors or server.listens_to(sensors[topic][1]):
+                self._arrivals.hear(absolute(topic))
 
-        topics.add_input(ODOM, "nav_msgs/Odometry", take_odometry)
-        for name, static in (("/tf", False), ("/tf_static", True)):
-            topics.add_input(name, "tf2_msgs/TFMessage", partial(self._take_transforms, context, static))
-        for name, (kind, source) in sensors.items():
-            topics.add_input(name, kind, self._sensor(name, kind, source, context, server))
+        inputs = RobotInputs(self._now, lambda: context, hear)
+        of_robot = inputs.of_robot(self._watched, self._transforms, self._uses_odometry)
+        for one in (*of_robot, *inputs.of_sensors(server.take_scan, sensors)):
+            topics.add_input(absolute(one.topic), one.type, one.take)
 
     def _publish(self, command: Command) -> None:
         for listener in self.on_command:
             listener(command)
-
-    def _take_transforms(self, context: MessageContext, static: bool, message: Message) -> None:
-        try:
-            for transform in transforms_of(message, context, self._now(), static):
-                self._transforms.set(transform)
-        except TransformError as error:
-            raise MessageError(str(error)) from error
-
-    def _sensor(
-        self, name: str, kind: str, source: str, context: MessageContext, server: AbstractNavigationServer
-    ) -> Callable[[Message], None]:
-        read = SENSORS[kind]
-
-        def take(message: Message) -> None:
-            try:
-                server.take_scan(read(message, context, source, self._now()))
-            except TransformError as error:
-                raise MessageError(str(error)) from error
-            if server.listens_to(source):
-                self._arrivals.hear(name)
-
-        return take

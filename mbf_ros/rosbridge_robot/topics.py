@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from mbf_abstract.event_values import error_text
-from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.goals.goal_types import MoveBaseGoal
-from mbf_abstract.goals.handle import AnyGoalHandle
-from mbf_abstract.maps.sensing import RangeScan
-from mbf_ros.messages.geometry import MessageContext, odometry_of, pose_of, transforms_of
+from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message, MessageError, completed
-from mbf_ros.messages.sensors import SENSORS
-from mbf_ros.ros2.robot import Arrivals, RosRobot
-from mbf_ros.rosbridge.navigation import GOAL_TOPICS
+from mbf_ros.robot_inputs import ODOM, Input, Take
+from mbf_ros.ros2.robot import Arrivals
 from mbf_ros.rosbridge.protocol import Operation, absolute, frame, text_in
 
-ODOM, TF, TF_STATIC, CLOCK = "/odom", "/tf", "/tf_static", "/clock"
 REPORT_PERIOD = 5.0  # s between two reports about messages of one topic
 CLOUDS = "sensor_msgs/PointCloud2"
 MAX_SKEW = 1.0  # s; more is not the way here but a calendar that is wrong
@@ -55,12 +48,12 @@ class Subscription:
     throttle : int
         Least time between two messages [ms].
     takers : list of callables
-        Raise ValueError or TransformError where a message means nothing.
+        Raise MessageError where a message means nothing.
     """
 
     type: str
     throttle: int = 0
-    takers: list[Callable[[Message], None]] = field(default_factory=list)
+    takers: list[Take] = field(default_factory=list)
 
 
 class RobotTopics:
@@ -87,52 +80,17 @@ class RobotTopics:
         self._subscriptions: dict[str, Subscription] = {}
         self._awaited: list[str] = []
 
-    def listen_to_robot(self, robot: RosRobot, transforms: TransformBuffer, uses_odometry: bool) -> None:
-        """Take odometry and transforms."""
+    def listen_to(self, inputs: Iterable[Input], cloud_period: float = 0.0) -> None:
+        """Take topics; odometry must come, and of clouds the robot is asked for one in ``cloud_period`` [s] at most."""
+        for one in inputs:
+            topic, throttle = absolute(one.topic), round(1000.0 * cloud_period) if one.type == CLOUDS else 0
+            self.listen(topic, one.type, one.take, throttle)
+            if one.topic == ODOM:
+                self.listen(topic, one.type, self._check_calendars)
+                self._awaited.append(topic)
+                self._arrivals.expect(topic)
 
-        def take_odometry(message: Message) -> None:
-            now = self._now()
-            odometry = odometry_of(message, self._context(), now)
-            robot.take_odometry(odometry)
-            self._arrivals.hear(ODOM)
-            if abs(ahead := odometry.stamp - now) > MAX_SKEW:
-                where = "in the future" if ahead > 0.0 else "in the past"
-                raise MessageError(f"it is stamped {abs(ahead):.2f} s {where}; set both calendars (NTP), or see --time")
-
-        def take_transforms(message: Message, static: bool = False) -> None:
-            for transform in transforms_of(message, self._context(), self._now(), static):
-                transforms.set(transform)
-
-        if uses_odometry:
-            self._awaited.append(ODOM)
-            self.listen(ODOM, "nav_msgs/Odometry", take_odometry)
-        self.listen(TF, "tf2_msgs/TFMessage", take_transforms)
-        self.listen(TF_STATIC, "tf2_msgs/TFMessage", lambda one: take_transforms(one, True))
-        self.lost()
-
-    def listen_to_sensors(
-        self, take_scan: Callable[[RangeScan], None], chosen: Mapping[str, tuple[str, str]], cloud_period: float
-    ) -> None:
-        """Feed sensors into the map: type of ``sensors.SENSORS`` and source, by topic."""
-        for topic, (kind, source) in chosen.items():
-            throttle = round(1000.0 * cloud_period) if kind == CLOUDS else 0
-            take = self._sensor(absolute(topic), kind, source, take_scan)
-            self.listen(absolute(topic), kind, take, throttle)
-
-    def listen_to_goals(self, send: Callable[[MoveBaseGoal], AnyGoalHandle], refusal: Callable[[], str]) -> None:
-        """Drive to the poses of the goal topics, unless there is a refusal; a newer one takes the older over."""
-
-        def go_to(message: Message) -> None:
-            if reason := refusal():
-                raise MessageError(reason)
-            handle = send(MoveBaseGoal(pose_of(message, self._context(), "goal").stamped(0.0)))
-            if handle.done and handle.result is not None:
-                raise MessageError(handle.result.message)
-
-        for topic in GOAL_TOPICS:
-            self.listen(topic, "geometry_msgs/PoseStamped", go_to)
-
-    def listen(self, topic: str, type_name: str, take: Callable[[Message], None], throttle: int = 0) -> None:
+    def listen(self, topic: str, type_name: str, take: Take, throttle: int = 0) -> None:
         """Take the messages of a topic, after those who take them already."""
         self._subscriptions.setdefault(topic, Subscription(type_name, throttle)).takers.append(take)
 
@@ -160,21 +118,25 @@ class RobotTopics:
             message = completed(subscription.type, operation.get("msg", {}))
             for take in subscription.takers:
                 take(message)
-        except (ValueError, TransformError) as error:
+        except MessageError as error:
             self._reports.bad(topic, error_text(error))
+
+    def hear(self, topic: str) -> None:
+        """Note that a message has come; once heard, a topic is missed."""
+        name = absolute(topic)
+        self._arrivals.hear(name)
+        if name not in self._awaited:
+            self._awaited.append(name)
 
     def lost(self) -> None:
         """Count what the robot must send as silent until it comes again."""
         for topic in self._awaited:
             self._arrivals.expect(topic)
 
-    def _sensor(
-        self, topic: str, kind: str, source: str, take_scan: Callable[[RangeScan], None]
-    ) -> Callable[[Message], None]:
-        def take(message: Message) -> None:
-            take_scan(SENSORS[kind](message, self._context(), source, self._now()))
-            self._arrivals.hear(topic)
-            if topic not in self._awaited:
-                self._awaited.append(topic)  # once heard, it is missed
-
-        return take
+    def _check_calendars(self, message: Message) -> None:
+        """Raise MessageError where the stamp of an odometry shows that a calendar is wrong."""
+        stamp = self._context().stamp(message["header"]["stamp"])
+        ahead = stamp - self._now() if stamp else 0.0
+        if abs(ahead) > MAX_SKEW:
+            where = "in the future" if ahead > 0.0 else "in the past"
+            raise MessageError(f"it is stamped {abs(ahead):.2f} s {where}; set both calendars (NTP), or see --time")

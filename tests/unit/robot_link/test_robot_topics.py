@@ -16,6 +16,7 @@ from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.time.sim_clock import SimClock
 from mbf_ros.messages.geometry import MessageContext, duration
 from mbf_ros.messages.interfaces import completed
+from mbf_ros.robot_inputs import RobotInputs
 from mbf_ros.ros2.robot import Arrivals, Frames, RosRobot
 from mbf_ros.rosbridge.protocol import OperationError, frame
 from mbf_ros.rosbridge_robot.frames import TYPED_ARRAYS, cbor_decoder, operation_of
@@ -39,12 +40,13 @@ class Site:
         )
         frames = Frames("map", "base_link")
         self.robot = RosRobot(lambda _: None, self.transforms, self.clock, self.arrivals, frames, lambda: 1.0)
-        self.topics.listen_to_robot(self.robot, self.transforms, True)
+        inputs = RobotInputs(self.clock.now, lambda: MessageContext("map", 1000.0), self.topics.hear)
+        self.topics.listen_to(inputs.of_robot(self.robot, self.transforms, True))
         sensors = {
             "front/scan": ("sensor_msgs/LaserScan", "lidar"),
             "/points": ("sensor_msgs/PointCloud2", "camera"),
         }
-        self.topics.listen_to_sensors(self.scans.append, sensors, 0.2)
+        self.topics.listen_to(inputs.of_sensors(self.scans.append, sensors), 0.2)
 
     def send(self, topic, **message):
         self.topics.take({"op": "publish", "topic": topic, "msg": message})

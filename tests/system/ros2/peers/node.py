@@ -20,8 +20,8 @@ FAULT = KeyError("a fault of ours")
 
 
 class Inputs(node.Inputs):
-    def listen_to_goals(self, send, refusal):
-        super().listen_to_goals(send, refusal)
+    def __init__(self, robot):
+        super().__init__(robot)
         self._node.create_subscription(Empty, "fail", self.fail, 10)
 
     def fail(self, message):

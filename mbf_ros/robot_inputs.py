@@ -1,0 +1,128 @@
+"""What comes from a robot and its users, and what takes it: one list for nodes of ROS 2 and both sides of rosbridge.
+
+Topics have the names of ROS 2: one without a leading slash belongs to the namespace of who listens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+from mbf_abstract.event_values import error_text
+from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.goals.goal_types import MoveBaseGoal
+from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_ros.messages.geometry import MessageContext, odometry_of, pose_of, transforms_of
+from mbf_ros.messages.interfaces import Message, MessageError
+from mbf_ros.messages.sensors import SENSORS
+from mbf_ros.ros2.robot import RosRobot
+
+ODOM, TF, TF_STATIC = "odom", "/tf", "/tf_static"
+GOALS = ("goal_pose", "move_base_simple/goal")
+Take = Callable[[Message], None]
+
+
+class Quality(Enum):
+    """How messages of a topic travel, where that can be chosen."""
+
+    SENSOR_DATA = "best effort"
+    MANY = "reliable"
+    LATCHED = "reliable, transient local"
+
+
+@dataclass(frozen=True)
+class Input:
+    """A topic that is taken.
+
+    Attributes
+    ----------
+    topic, type : str
+    quality : Quality
+    take : callable
+        Takes a message; raises MessageError where it means nothing.
+    """
+
+    topic: str
+    type: str
+    quality: Quality
+    take: Take
+
+
+@dataclass(frozen=True)
+class RobotInputs:
+    """The inputs of a navigator.
+
+    Attributes
+    ----------
+    now : callable
+        Our time [s].
+    context : callable
+        How stamps and frames relate to ours, now.
+    hear : callable
+        Called with the topic of each odometry and each scan that was taken.
+    """
+
+    now: Callable[[], float]
+    context: Callable[[], MessageContext]
+    hear: Callable[[str], None] = lambda topic: None
+
+    def of_robot(self, robot: RosRobot, transforms: TransformBuffer, uses_odometry: bool) -> Iterator[Input]:
+        """Yield odometry, where it is used, and transforms."""
+
+        def take_odometry(message: Message) -> None:
+            robot.take_odometry(odometry_of(message, self.context(), self.now()))
+            self.hear(ODOM)
+
+        def take_transforms(message: Message, static: bool = False) -> None:
+            for transform in transforms_of(message, self.context(), self.now(), static):
+                transforms.set(transform)
+
+        if uses_odometry:
+            yield Input(ODOM, "nav_msgs/Odometry", Quality.SENSOR_DATA, take_odometry)
+        yield Input(TF, "tf2_msgs/TFMessage", Quality.MANY, _refusing(take_transforms))
+        static = _refusing(lambda message: take_transforms(message, static=True))
+        yield Input(TF_STATIC, "tf2_msgs/TFMessage", Quality.LATCHED, static)
+
+    def of_sensors(
+        self, take_scan: Callable[[RangeScan], None], chosen: Mapping[str, tuple[str, str]]
+    ) -> Iterator[Input]:
+        """Yield sensors that feed a map: type of ``sensors.SENSORS`` and source in the configuration, by topic."""
+        for topic, (kind, source) in chosen.items():
+            yield Input(topic, kind, Quality.SENSOR_DATA, _refusing(self._sensor(topic, kind, source, take_scan)))
+
+    def of_users(
+        self, send: Callable[[MoveBaseGoal], AnyGoalHandle], refusal: Callable[[], str] = lambda: ""
+    ) -> Iterator[Input]:
+        """Yield goals, which are driven to unless there is a refusal; a newer one takes the older one over."""
+
+        def go_to(message: Message) -> None:
+            if reason := refusal():
+                raise MessageError(reason)
+            handle = send(MoveBaseGoal(pose_of(message, self.context(), "goal").stamped(0.0)))
+            if handle.done and handle.result is not None:
+                raise MessageError(handle.result.message)
+
+        for topic in GOALS:
+            yield Input(topic, "geometry_msgs/PoseStamped", Quality.MANY, go_to)
+
+    def _sensor(self, topic: str, kind: str, source: str, take_scan: Callable[[RangeScan], None]) -> Take:
+        def take(message: Message) -> None:
+            take_scan(SENSORS[kind](message, self.context(), source, self.now()))
+            self.hear(topic)
+
+        return take
+
+
+def _refusing(take: Take) -> Take:
+    """A taker whose map or transforms may refuse what a message says, and which raises MessageError then."""
+
+    def take_or_refuse(message: Message) -> None:
+        try:
+            take(message)
+        except (ValueError, TransformError) as error:
+            raise MessageError(error_text(error)) from error
+
+    return take_or_refuse
