@@ -14,7 +14,7 @@ from mbf_abstract.actions.plugin_action import PluginAction
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
-from mbf_abstract.execution.plan_check import area_problem, check_path, in_global_frame
+from mbf_abstract.execution.plan_check import area_problem, in_global_frame, path_result
 from mbf_abstract.execution.planner import FALLBACK_OUTCOMES, PlannerExecution, PlannerState
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
@@ -120,7 +120,7 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         else:
             fields.update(plugin_outcome=int(last.outcome), plugin_message=last.message)
         if state is PlannerState.FOUND_PLAN:
-            return self._found(last, handle, request, fields)
+            return self._found(last, handle, request, planner)
         if state is PlannerState.CANCELED:
             return GetPathResult(GetPathOutcome.CANCELED, handle.cancel_reason, **fields)
         if state is PlannerState.PAT_EXCEEDED:
@@ -128,23 +128,13 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
             return GetPathResult(GetPathOutcome.PAT_EXCEEDED, f"no plan within {self.patience:g} s{tail}", **fields)
         return GetPathResult(int(last.outcome), last.message, cost=last.cost, permanent=last.permanent, **fields)
 
-    def _found(self, answer: PlanResult, handle: Handle, request: PlanRequest, fields: dict[str, Any]) -> GetPathResult:
+    def _found(self, answer: PlanResult, handle: Handle, request: PlanRequest, planner: str) -> GetPathResult:
         """4. Check the path of a plugin that reports success."""
-        checked = check_path(answer, request, self.runtime, handle.goal.goal_area)
-        path = checked.path
-        if path is None:
-            return GetPathResult(checked.outcome, checked.message, **fields)
-        cost = answer.cost if answer.cost != 0.0 else path.length
-        self.runtime.events.emit(
-            EventKind.PLAN,
-            self.name,
-            goal_id=handle.id,
-            plugin=fields["planner"],
-            cost=cost,
-            length=path.length,
-            poses=len(path),
-        )
-        return GetPathResult(int(answer.outcome), answer.message or "plan found", path=path, cost=cost, **fields)
+        result = path_result(answer, request, self.runtime, planner, handle.goal.goal_area)
+        if result.path is not None:
+            numbers = {"cost": result.cost, "length": result.path.length, "poses": len(result.path)}
+            self.runtime.events.emit(EventKind.PLAN, self.name, goal_id=handle.id, plugin=planner, **numbers)
+        return result
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> GetPathResult:
         """Result without a path."""

@@ -6,11 +6,13 @@ Each becomes a failure that names what is wrong, so that no controller ever foll
 
 from __future__ import annotations
 
+from typing import Any
+
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_area import GoalArea
-from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathResult, MoveBaseGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 
@@ -64,3 +66,23 @@ def check_path(answer: PlanResult, request: PlanRequest, runtime: Runtime, area:
             text = f"pose {index} of the path is {distance:.2f} m from the {name}, allowed {tolerance + slack:.2f} m"
             return PlanResult(GetPathOutcome.INTERNAL_ERROR, text)
     return PlanResult(answer.outcome, answer.message, path, answer.cost)
+
+
+def path_result(
+    answer: PlanResult, request: PlanRequest, runtime: Runtime, planner: str, area: GoalArea | None = None
+) -> GetPathResult:
+    """Judge the last answer of a planner: its path in the global frame, or why there is none."""
+    fields: dict[str, Any] = {
+        "planner": planner,
+        "plugin_outcome": int(answer.outcome),
+        "plugin_message": answer.message,
+    }
+    if not answer.success:
+        return GetPathResult(
+            int(answer.outcome), answer.message, cost=answer.cost, permanent=answer.permanent, **fields
+        )
+    checked = check_path(answer, request, runtime, area)
+    if checked.path is None:
+        return GetPathResult(checked.outcome, checked.message, **fields)
+    cost = answer.cost if answer.cost != 0.0 else checked.path.length
+    return GetPathResult(int(answer.outcome), answer.message or "plan found", path=checked.path, cost=cost, **fields)

@@ -134,6 +134,22 @@ class PluginHost(ABC):
         instance: Plugin = spec.plugin_class(self.make_context(spec.kind, spec.options, base))
         return LoadedPlugin(spec, instance, runtime)
 
+    def further_instance(self, kind: PluginKind, name: str) -> Any:
+        """Construct another instance of a loaded plugin, with its present parameters, for use beside the actions.
+
+        Raises
+        ------
+        ServerError
+            No such plugin, a goal is using it, or its constructor raised.
+        """
+        plugin = self._loaded(kind, name)
+        with self._in_own_use(plugin, "a further instance"):  # not the parameters of a goal
+            spec = replace(plugin.spec, parameters=plugin.instance.parameters)
+        try:
+            return self._construct(spec).instance
+        except (Exception, SystemExit) as error:
+            raise ServerError(_failure(spec, error)) from error
+
     def _loaded(self, kind: PluginKind, name: str) -> LoadedPlugin[Any]:
         plugin = self.plugins.find(kind, name) if name else None
         if plugin is None:

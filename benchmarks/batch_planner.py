@@ -1,0 +1,140 @@
+"""Many plans on all processors: throughput of ``BatchPlanner``, as a ratio to one worker in the same run.
+
+    python benchmarks/batch_planner.py [--quick] [--json] [--pairs 60] [--workers N] [--rounds 3]
+
+Mesh: the fractal terrain of ``mesh_speed.py`` (277,000 vertices; ``--quick``: 90,000) with the layers of a bare mesh.
+Grid: 1000 x 1000 cells (``--quick``: 400 x 400) with round obstacles, inflated. Each round plans all pairs with one
+worker and with all of them, one after the other; the figure is the median ratio of the wall-clock times, so nothing
+else may run meanwhile.
+The bar is 1.8 on two processors.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from PIL import Image
+from terrain_meshes import fractal_terrain
+
+from mbf_abstract.commands.standing_server import read_config_or_map, standing_server
+from mbf_abstract.geometry import Pose
+from mbf_abstract.plugins import PluginKind
+from mbf_abstract.server.batch_planner import BatchPlanner
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+
+Ends = tuple[list[Pose], list[Pose]]
+BAR_ON_TWO = 1.8
+PLANNERS = {
+    "mesh": ("astar", "dijkstra", "cvp", "any_angle", "heading_astar"),
+    "costmap": ("astar", "theta_star", "hybrid_astar"),
+}
+MAP_YAML = """
+image: discs.png
+resolution: 0.05
+origin: [0, 0, 0]
+negate: 0
+occupied_thresh: 0.65
+free_thresh: 0.25
+"""
+
+
+def hills(folder: Path, side: int) -> Path:
+    """A bare mesh of the fractal terrain with ``side`` vertices along an edge."""
+    terrain = fractal_terrain(side)
+    file = folder / "hills.ply"
+    trimesh.Trimesh(terrain.vertices, terrain.faces, process=False).export(file)
+    return file
+
+
+def discs(folder: Path, side: int) -> Path:
+    """A bare map of ``side`` x ``side`` cells of 5 cm with one round obstacle for each 2,500 cells."""
+    rng = np.random.default_rng(7)
+    image = np.full((side, side), 254, dtype=np.uint8)
+    y, x = np.mgrid[0:side, 0:side]
+    for centre_x, centre_y, radius in rng.uniform((0, 0, 2), (side, side, 9), (side * side // 2500, 3)):
+        image[(x - centre_x) ** 2 + (y - centre_y) ** 2 < radius**2] = 0
+    Image.fromarray(image).save(folder / "discs.png")
+    file = folder / "discs.yaml"
+    file.write_text(MAP_YAML)
+    return file
+
+
+def reachable_pairs(server: AbstractNavigationServer, size: float, count: int) -> tuple[list[Pose], list[Pose]]:
+    """Random pairs of poses on the ground that the first planner finds a path between."""
+    batch = BatchPlanner(server)
+    rng, starts, goals = np.random.default_rng(11), [], []
+    while len(starts) < count:
+        drawn = rng.uniform(0.05 * size, 0.95 * size, (2 * count, 2, 2))
+        ends = [[server.ground_pose(*place) for place in drawn[:, side]] for side in (0, 1)]
+        for start, goal, result in zip(*ends, batch.plan_many(*ends), strict=True):
+            if result.success:
+                starts.append(start)
+                goals.append(goal)
+    return starts[:count], goals[:count]
+
+
+def seconds(batch: BatchPlanner, ends: Ends) -> float:
+    """Wall-clock time [s] of all pairs."""
+    begin = time.perf_counter()
+    batch.plan_many(*ends)
+    return time.perf_counter() - begin
+
+
+def measure(backend: str, file: Path, size: float, options: argparse.Namespace) -> Iterator[dict[str, float | str]]:
+    """Yield a row for each planner of a backend."""
+    cls, config, _ = read_config_or_map(file)
+    with standing_server(cls, config) as server:
+        for name in PLANNERS[backend]:
+            server.load_plugin_type(PluginKind.PLANNER, f"bench_{name}", name)
+        ends = reachable_pairs(server, size, options.pairs)
+        for name in PLANNERS[backend]:
+            alone, together = (BatchPlanner(server, f"bench_{name}", workers) for workers in (1, options.workers))
+            ratios = []
+            for number in range(options.rounds + 1):
+                one = seconds(alone, ends)
+                ratio = one / seconds(together, ends)
+                if number:  # the first round compiles
+                    ratios.append(ratio)
+            yield {
+                "planner": f"{backend}.{name}",
+                "one_ms": 1e3 * one / options.pairs,
+                "ratio": float(np.median(ratios)),
+            }
+
+
+def main() -> None:
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--quick", action="store_true", help="smaller maps")
+    arguments.add_argument("--json", action="store_true", help="print the figures as one JSON line at the end")
+    arguments.add_argument("--pairs", type=int, default=60)
+    arguments.add_argument("--rounds", type=int, default=3)
+    arguments.add_argument("--workers", type=int, default=len(os.sched_getaffinity(0)))
+    options = arguments.parse_args()
+    side, cells = (300, 400) if options.quick else (526, 1000)
+    rows = []
+    with tempfile.TemporaryDirectory(prefix="mbf_plan_many_") as folder:
+        spacing = fractal_terrain(2).vertices[:, 0].max()
+        worlds = (
+            ("mesh", hills(Path(folder), side), spacing * (side - 1)),
+            ("costmap", discs(Path(folder), cells), 0.05 * cells),
+        )
+        print(f"{'planner':22}{'one worker':>12} a plan, {options.workers} workers are as fast as")
+        for backend, file, size in worlds:
+            for row in measure(backend, file, size, options):
+                rows.append(row)
+                verdict = "" if options.workers != 2 else "ok" if row["ratio"] >= BAR_ON_TWO else "MISSED"
+                print(f"{row['planner']:22}{row['one_ms']:9.2f} ms {row['ratio']:9.2f} {verdict}", flush=True)
+    if options.json:
+        print(json.dumps(rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,151 @@
+"""Plans between many pairs of poses, on all processors: for evaluations, and for the legs of a whole fleet.
+
+When to use: hundreds of plans on one map. When not: for the next path of one robot; the action ``get_path`` has
+patience, retries, a fallback planner and events, and none of them is here.
+
+Planners spend their time in kernels that release the interpreter's lock, so threads share one map and copy nothing.
+Each thread has an instance of the planner of its own. A planner written in plain Python gains nothing.
+
+Example
+-------
+>>> batch = BatchPlanner(navigator.server, "astar")
+>>> lengths = [plan.path.length for plan in batch.plan_many(starts, goals) if plan.success]
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import count
+
+from mbf_abstract.event_values import error_text
+from mbf_abstract.execution.plan_check import in_global_frame, path_result
+from mbf_abstract.execution.plugin_answer import PluginFault, checked_answer
+from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import GetPathResult
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginKind
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.server.plugin_host import ServerError
+from mbf_abstract.time.cancel import CancelToken
+
+
+class BatchPlanner:
+    """Instances of one planner, one a thread; they keep from call to call what they have found out about the map.
+
+    Parameters
+    ----------
+    server : AbstractNavigationServer
+        Whose map and planner are used. Goals may run beside a batch.
+    planner : str
+        Name of a loaded planner, whose parameters are taken over as they are now; the first one if empty.
+    workers : int, optional
+        Number of threads; one a processor that this process may use if not given.
+
+    Raises
+    ------
+    ServerError
+        There is no such planner, or it can not be used, or a goal is using it right now.
+    ValueError
+        There is no worker.
+    """
+
+    def __init__(self, server: AbstractNavigationServer, planner: str = "", workers: int | None = None) -> None:
+        workers = len(os.sched_getaffinity(0)) if workers is None else workers
+        if workers < 1:
+            raise ValueError(f"at least one worker is needed, got {workers}")
+        if problem := server.plugins.problem(PluginKind.PLANNER, planner):
+            raise ServerError(problem)
+        name = server.plugins.get(PluginKind.PLANNER, planner).name
+        self._server = server
+        self._planners = [server.further_instance(PluginKind.PLANNER, name) for _ in range(workers)]
+
+    def plan_many(
+        self,
+        starts: Sequence[Pose],
+        goals: Sequence[Pose],
+        *,
+        dist_tolerance: float | None = None,
+        angle_tolerance: float | None = None,
+        cancel_token: CancelToken | None = None,
+    ) -> list[GetPathResult]:
+        """Plan from every start to the goal of the same index; one call at a time.
+
+        The result of a pair is that of one call of the planner, checked as ``get_path`` checks it. It does not depend
+        on the number of workers as long as the planner's answers do not depend on what it was asked before, which
+        holds for all that are shipped. What sensors see meanwhile is in the later plans only.
+
+        Parameters
+        ----------
+        starts, goals : sequences of Pose
+            Of the same length n, in any frame that the server knows.
+        dist_tolerance, angle_tolerance : float, optional
+            How far [m], [rad] from its goal a path may end; the server's parameters if not given.
+        cancel_token : CancelToken, optional
+            Once it is set, the pairs that are left end with CANCELED.
+
+        Returns
+        -------
+        list of n GetPathResult
+            In the order of the pairs. What a planner raises is the INTERNAL_ERROR of its pair.
+
+        Raises
+        ------
+        ValueError
+            Not as many starts as goals, or a tolerance is negative.
+        TransformError
+            A pose can not be brought into the global frame.
+        """
+        if len(starts) != len(goals):
+            raise ValueError(f"as many starts as goals are needed, got {len(starts)} and {len(goals)}")
+        parameters, runtime = self._server.runtime.parameters, self._server.runtime
+        distance = parameters.dist_tolerance if dist_tolerance is None else dist_tolerance
+        angle = parameters.angle_tolerance if angle_tolerance is None else angle_tolerance
+        if not (distance >= 0.0 and angle >= 0.0):  # not a number is no tolerance either
+            raise ValueError(f"tolerances must not be negative, got {distance} m and {angle} rad")
+        token = cancel_token or CancelToken()
+        requests = [
+            PlanRequest(
+                in_global_frame(start, runtime), in_global_frame(goal, runtime), distance, angle, cancel_token=token
+            )
+            for start, goal in zip(starts, goals, strict=True)
+        ]
+        return self._plan(requests, token) if requests else []
+
+    def _plan(self, requests: list[PlanRequest], token: CancelToken) -> list[GetPathResult]:
+        """Hand the requests out to the threads, one by one."""
+        results: dict[int, GetPathResult] = {}
+        numbers = count()  # its next() is atomic
+
+        def indices() -> Iterator[int]:
+            while (index := next(numbers)) < len(requests):
+                yield index
+
+        def work(planner: AbstractPlanner) -> None:
+            for index in indices():
+                answer = _ask(planner, requests[index])
+                results[index] = path_result(answer, requests[index], self._server.runtime, planner.name)
+
+        planners = self._planners[: len(requests)]
+        with self._server.using_map(PluginKind.PLANNER), ThreadPoolExecutor(len(planners), "plan_many") as pool:
+            try:
+                for done in [pool.submit(work, planner) for planner in planners]:
+                    done.result()
+            except BaseException:  # a Ctrl-C: the pool waits for its threads
+                token.cancel("interrupted")
+                raise
+        return [results[index] for index in range(len(requests))]
+
+
+def _ask(planner: AbstractPlanner, request: PlanRequest) -> PlanResult:
+    """Call a planner once; a cancel before the call and an exception are answers, too."""
+    if request.cancel_token.cancelled:
+        return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
+    try:
+        return checked_answer(planner.make_plan(request), PlanResult, planner.name, "make_plan")
+    except PluginFault as fault:
+        text = str(fault)
+    except Exception as error:
+        text = f"plugin {planner.name!r} raised {type(error).__name__} in make_plan: {error_text(error)}"
+    return PlanResult(GetPathOutcome.INTERNAL_ERROR, text)
