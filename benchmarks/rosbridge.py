@@ -14,9 +14,9 @@ from itertools import pairwise
 
 from websockets.sync.client import connect
 
+from mbf_abstract.access.web_socket_server import ServerOptions
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.time.clock import WallClock, wall_seconds
-from mbf_ros.rosbridge.server import ServerOptions
 from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
 from terrain.session.served_world import open_world
 from terrain.session.session import Session

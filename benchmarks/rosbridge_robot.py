@@ -18,12 +18,12 @@ from pathlib import Path
 
 from websockets.sync.client import connect
 
+from mbf_abstract.access.web_socket_server import ServerOptions
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal, MoveBaseGoal
 from mbf_abstract.server.factory import read_config
 from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_abstract.time.clock import WallClock, wall_seconds
-from mbf_ros.rosbridge.server import ServerOptions
 from mbf_ros.rosbridge.serving import BridgeOptions
 from mbf_ros.rosbridge_robot.navigator import connect_navigator
 from mbf_ros.rosbridge_robot.simulated_robot import serve_robot

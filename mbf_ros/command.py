@@ -17,8 +17,7 @@ from mbf_ros.rosbridge_robot.command import connect
 if TYPE_CHECKING:
     from mbf_abstract.access.page_access import PageAccess
     from mbf_abstract.session import NavigationSession
-    from mbf_ros.rosbridge.server import RosbridgeServer
-    from mbf_ros.rosbridge.serving import BridgeOptions
+    from mbf_ros.rosbridge.serving import BridgeOptions, RosbridgeServer
     from mbf_ros.rosbridge_robot.topic_robot import TopicRobot
 
 WORLDS_GROUP = "mbf.worlds"
@@ -71,7 +70,7 @@ def serve(
 ) -> None:
     """Serve a navigator, or a simulated robot alone, to clients of rosbridge, until Ctrl-C."""
     with readable_errors():
-        from mbf_ros.rosbridge.server import ServerOptions
+        from mbf_abstract.access.web_socket_server import ServerOptions
         from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
         from mbf_ros.rosbridge_robot.simulated_robot import serve_robot
         from mbf_ros.sensor_options import sensors_of

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from mbf_abstract.access.page_access import Role
+from mbf_abstract.access.visitor import HangUp
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventBus, EventKind
 from mbf_abstract.time.clock import Clock
@@ -75,6 +76,10 @@ class Bridge:
             "set_level": lambda client, op: None,  # errors are always sent, and nothing else
             "auth": lambda client, op: None,  # of a client that needs none
         }
+
+    def welcome(self, name: str, role: Role | None, hang_up: HangUp) -> Client:
+        """Return the client of a new connection."""
+        return Client(name, role, hang_up)
 
     def take(self, client: Client, text: str | bytes) -> None:
         """Do what a client asks for; what cannot be done is answered with a status of the level error."""

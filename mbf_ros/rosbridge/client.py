@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from mbf_abstract.access.page_access import Role
-from mbf_ros.rosbridge.outbox import Outbox
+from mbf_abstract.access.visitor import Visitor
 from mbf_ros.rosbridge.protocol import error_frame
 
 
@@ -20,28 +19,17 @@ class SentGoal(Protocol):
 
 
 @dataclass(eq=False)
-class Client:
+class Client(Visitor):
     """A client of the server; used on the event loop only.
 
     Attributes
     ----------
-    name : str
-        For events: its address.
-    role : Role, optional
-        What it may do; None until it has given the token.
-    outbox : Outbox
     goals : dict of str to SentGoal
         Its goals that are not over, by the ids it gave them.
     calls : int
         Its services that are being worked on.
-    hang_up : callable
-        Ends the connection with a reason.
     """
 
-    name: str
-    role: Role | None
-    hang_up: Callable[[str], None]
-    outbox: Outbox = field(default_factory=Outbox)
     goals: dict[str, SentGoal] = field(default_factory=dict)
     calls: int = 0
 

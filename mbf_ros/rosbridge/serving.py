@@ -12,6 +12,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 
+from mbf_abstract.access.web_socket_server import Offer, ServerOptions, WebSocketServer
+from mbf_abstract.events import EventBus
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import unix_seconds
 from mbf_abstract.time.ticker import Ticker
@@ -19,12 +21,22 @@ from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.rosbridge.actionlib import ActionlibServer
 from mbf_ros.rosbridge.authentication import Authentication
 from mbf_ros.rosbridge.bridge import Bridge
+from mbf_ros.rosbridge.client import Client
 from mbf_ros.rosbridge.navigation import NODE, ServerParameters, serve_navigator
 from mbf_ros.rosbridge.page import page_files
 from mbf_ros.rosbridge.publishing import Publisher
 from mbf_ros.rosbridge.rosapi import serve_rosapi
-from mbf_ros.rosbridge.server import RosbridgeServer, ServerOptions
 from mbf_ros.rosbridge_robot.topic_robot import WATCH_PERIOD, TopicRobot
+
+PORT = 9090
+RosbridgeServer = WebSocketServer[Client]
+"""A server whose clients speak the rosbridge protocol."""
+
+
+def rosbridge_server(bridge: Bridge, events: EventBus, options: ServerOptions) -> RosbridgeServer:
+    """Return a server of a bridge and its page, not started yet."""
+    offer = Offer("rosbridge", extra="bridge", origin_option="--allow-origin", pages=page_files())
+    return WebSocketServer(bridge, events, options, offer)
 
 
 @dataclass(frozen=True)
@@ -43,7 +55,7 @@ class BridgeOptions:
         Of a ``TopicRobot``: type and source in the configuration of each topic of a sensor.
     """
 
-    server: ServerOptions = field(default_factory=ServerOptions)
+    server: ServerOptions = field(default_factory=lambda: ServerOptions(port=PORT))
     cancel_on_disconnect: bool = True
     stamped_commands: bool = False
     sensors: Mapping[str, tuple[str, str]] = field(default_factory=dict)
@@ -74,7 +86,7 @@ def serve_session(
     context = MessageContext(runtime.robot.global_frame, unix_seconds() - clock.now())
     authentication = Authentication(options.server.access.roles, unix_seconds)
     bridge = Bridge(clock, events, context, authentication, options.cancel_on_disconnect)
-    server = RosbridgeServer(bridge, events, options.server, page_files())
+    server = rosbridge_server(bridge, events, options.server)
     serve_navigator(bridge, navigator, context)
     serve_rosapi(bridge, ServerParameters(navigator), NODE, context, clock.now)
     actionlib = ActionlibServer(bridge.topics, navigator, context, clock.now, server.post)

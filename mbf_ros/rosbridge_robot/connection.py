@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable
 from functools import partial
 
+from mbf_abstract.access.outbox import MAX_ANSWERS, WaitingFrames
 from mbf_abstract.event_values import error_text
 from mbf_abstract.time.clock import Clock, ClockThread
-from mbf_ros.rosbridge.outbox import MAX_ANSWERS, WaitingFrames
 from mbf_ros.rosbridge_robot.dialing import LinkError, Socket
 
 

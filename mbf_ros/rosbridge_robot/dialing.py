@@ -22,7 +22,7 @@ class LinkError(ValueError):
 class Socket(Protocol):
     """What is used of a WebSocket."""
 
-    def send(self, message: str, /) -> None:
+    def send(self, message: str | bytes, /) -> None:
         """Send a text frame; may wait."""
 
     def recv(self) -> str | bytes:

@@ -16,10 +16,8 @@ from mbf_ros.messages.geometry import MessageContext, twist_of
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.rosbridge.authentication import Authentication
 from mbf_ros.rosbridge.bridge import Bridge
-from mbf_ros.rosbridge.page import page_files
 from mbf_ros.rosbridge.protocol import frame
-from mbf_ros.rosbridge.server import RosbridgeServer
-from mbf_ros.rosbridge.serving import BridgeOptions
+from mbf_ros.rosbridge.serving import BridgeOptions, RosbridgeServer, rosbridge_server
 from mbf_ros.rosbridge_robot.robot_state import RobotState
 
 PERIOD = 0.05  # s between two looks at the robot
@@ -47,7 +45,7 @@ def serve_robot(session: NavigationSession, options: BridgeOptions | None = None
     context = MessageContext(server.runtime.robot.global_frame, unix_seconds() - clock.now())
     authentication = Authentication(options.server.access.roles, unix_seconds)
     bridge = Bridge(clock, events, context, authentication, options.cancel_on_disconnect)
-    served = RosbridgeServer(bridge, events, options.server, page_files())
+    served = rosbridge_server(bridge, events, options.server)
 
     def drive(message: Message) -> None:
         lease.send(twist_of(message["twist"] if options.stamped_commands else message))

@@ -20,13 +20,8 @@ from terrain.commands.rerun import rerun
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from terrain.commands.live_line import LiveLine
     from terrain.scenarios.scenario import Scenario
-    from terrain.session.goal_sequence import GoalSequence
-    from terrain.session.run_options import Watch
     from terrain.session.runner import RunOptions, RunResult
-    from terrain.session.session import Session
-    from terrain.viewer.live.session import ViewOptions
 
 
 def register(app: typer.Typer) -> None:
@@ -66,7 +61,18 @@ def run(
     ),
     view_read_only: bool = typer.Option(False, "--view-read-only", help="Watching only, no steering."),
     view_speed: float = typer.Option(
-        1.0, "--view-speed", min=0.0, help="With --view: at most so many times real time; 0 = no limit."
+        1.0, "--view-speed", min=0.0, help="While watched: at most so many times real time; 0 = no limit."
+    ),
+    foxglove: bool = typer.Option(False, "--foxglove", help="Serve the run live to Foxglove, until Ctrl-C."),
+    foxglove_at: str = typer.Option(
+        "127.0.0.1:8765", "--foxglove-at", metavar="HOST:PORT", help="Where; the next free port. Not encrypted."
+    ),
+    foxglove_token: bool = typer.Option(
+        True, "--foxglove-token/--no-foxglove-token", help="A token in the address, without which access is refused."
+    ),
+    foxglove_read_only: bool = typer.Option(False, "--foxglove-read-only", help="Watching only, no steering."),
+    foxglove_origin: list[str] = typer.Option(
+        [], "--foxglove-origin", help="Origin of another web app that may connect; repeatable."
     ),
     ros2: bool = typer.Option(
         False, "--ros2", help="The robot is a node of ROS 2, and whoever publishes cmd_vel drives it; see docs/ros2.md."
@@ -78,7 +84,7 @@ def run(
     ros2_patience: float = typer.Option(
         60.0, "--ros2-patience", min=1.0, help="With --ros2: end after so long without a command to move, in s."
     ),
-    stay: bool = typer.Option(True, "--stay/--no-stay", help="With --view: wait for goals from the page at the end."),
+    stay: bool = typer.Option(True, "--stay/--no-stay", help="While watched: wait for goals from there at the end."),
     show: bool = typer.Option(False, "--open", help="Open the replay in the browser at the end."),
     quiet: bool = typer.Option(False, "--quiet", help="Print the result without progress."),
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object with verdict and metrics."),
@@ -89,15 +95,19 @@ def run(
     for a mistake in scenario, configuration or arguments.
     """
     chosen = settings_of(settings, planner=planner, controller=controller)
+    if not foxglove:
+        refuse_without(context, "--foxglove", "foxglove_at", "foxglove_token", "foxglove_read_only", "foxglove_origin")
     if not ros2:
         refuse_without(context, "--ros2", "ros2_stamped", "ros2_lockstep", "ros2_patience")
     with readable_errors():
         from mbf_abstract.config.findings import ConfigError
         from mbf_abstract.server.plugin_host import ServerError
         from terrain.commands.live_line import LiveLine
+        from terrain.commands.watching import watched
         from terrain.scenarios.on_map import on_map
         from terrain.scenarios.scenario import load_scenario, scenario_file
         from terrain.session.runner import RunOptions, run_scenario
+        from terrain.viewer.foxglove.options import FoxgloveOptions, parsed_address
         from terrain.viewer.live.session import ViewOptions
         from terrain.viewer.results import write_joint_results, write_results
 
@@ -120,9 +130,12 @@ def run(
                 write_views=partial(write_results, on_step=live.step),
                 write_joint_views=partial(write_joint_results, on_step=live.step),
             )
-            if view:
+            if view or foxglove:
                 page = ViewOptions(view_host, view_port, view_speed, view_token, view_read_only)
-                options = replace(options, watch=_live_view(page, live), stay=stay)
+                origins = tuple(foxglove_origin)
+                app = FoxgloveOptions(*parsed_address(foxglove_at), foxglove_token, foxglove_read_only, origins)
+                watches = (page if view else None, app if foxglove else None)
+                options = watched(replace(options, stay=stay), *watches, view_speed, live)
             if ros2:
                 from terrain.commands.robot_on_ros import driven_over_ros, require_one_robot
 
@@ -147,18 +160,6 @@ def refuse_without(context: typer.Context, needed: str, *names: str) -> None:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
             raise typer.BadParameter(f"it goes with {needed} only", param_hint=f"--{name.replace('_', '-')}")
-
-
-def _live_view(page: ViewOptions, live: LiveLine) -> Watch:
-    """Return what serves the page of a session while it runs, and prints its address."""
-    from terrain.viewer.live.session import LiveSession
-
-    def watch(session: Session, goals: GoalSequence) -> LiveSession:
-        _, _, name = session.scenario.name.partition("/")  # of one of several robots
-        title = f"live view of {name}" if name else "live view"
-        return LiveSession(session, goals, page, lambda at: live.note(f"{title} at {at}"), live.note)
-
-    return watch
 
 
 def _all_that_is_wrong(

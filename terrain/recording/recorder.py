@@ -108,20 +108,30 @@ class Recorder:
 
     def finish(self, verdict: Verdict = UNFINISHED, events: Sequence[Event] = (), began: float = 0.0) -> Recording:
         """Return what was recorded; ``began`` [s] is the events' time at which the samples' time was 0."""
-        return self._recording(Taken(), verdict, events, began)
+        return self._recording(Taken(), self._all(), verdict, events, began)
 
     def take(self, events: Sequence[Event] = (), began: float = 0.0) -> Recording:
         """Return what has come since this was called last, with these events; surfaces the first time only."""
-        before = self._taken
-        self._taken = Taken(
-            len(self._samples), len(self.paths), len(self.scans), len(self.grids), len(self.meshes)
-        )  # fmt: skip
-        return self._recording(before, UNFINISHED, events, began)
+        part, self._taken = self.since(self._taken, events, began)
+        return part
 
-    def _recording(self, before: Taken, verdict: Verdict, events: Sequence[Event], began: float) -> Recording:
-        """Return all but what has been taken before."""
-        rows = np.array(self._samples[before.samples :], dtype=np.float64).reshape(-1, 14)
-        meshes = self.meshes[before.meshes :]
+    def since(self, before: Taken, events: Sequence[Event] = (), began: float = 0.0) -> tuple[Recording, Taken]:
+        """Return what has come since ``before``, with these events, and where the next part begins.
+
+        Surfaces are in the first part only. ``began`` is as in ``finish``.
+        """
+        now = self._all()
+        return self._recording(before, now, UNFINISHED, events, began), now
+
+    def _all(self) -> Taken:
+        return Taken(len(self._samples), len(self.paths), len(self.scan_origins), len(self.grids), len(self.meshes))
+
+    def _recording(
+        self, before: Taken, now: Taken, verdict: Verdict, events: Sequence[Event], began: float
+    ) -> Recording:
+        """Return all from ``before`` to ``now``."""
+        rows = np.array(self._samples[before.samples : now.samples], dtype=np.float64).reshape(-1, 14)
+        meshes = self.meshes[before.meshes : now.meshes]
         if before.meshes:  # the surface has been taken
             meshes = [replace(mesh, vertices=np.zeros((0, 3)), faces=np.zeros((0, 3), np.int32)) for mesh in meshes]
         ground, walls, obstacles = (
@@ -140,21 +150,21 @@ class Recorder:
             poses=rows[:, 1:8].copy(),
             twists=rows[:, 8:11].copy(),
             commands=rows[:, 11:14].copy(),
-            paths=self.paths[before.paths :],
-            scans=self.scans[before.scans :],
-            scan_origins=np.array(self.scan_origins[before.scans :]).reshape(-1, 3),
+            paths=self.paths[before.paths : now.paths],
+            scans=self.scans[before.scans : now.scans],
+            scan_origins=np.array(self.scan_origins[before.scans : now.scans]).reshape(-1, 3),
             events=tuple(replace(event, time=max(0.0, round(event.time - began, 9))) for event in events),
             verdict=verdict,
-            grids=self.grids[before.grids :],
+            grids=self.grids[before.grids : now.grids],
             meshes=meshes,
-            actors=self._actor_tracks(before.samples),
+            actors=self._actor_tracks(before.samples, now.samples),
         )
 
     def actor_tracks(self) -> list[ActorTrack]:
         """Return what moves by itself, and where it was at each sample so far."""
-        return self._actor_tracks(0)
+        return self._actor_tracks(0, len(self._samples))
 
-    def _actor_tracks(self, first: int) -> list[ActorTrack]:
-        rows = self._actor_poses[first:]
+    def _actor_tracks(self, first: int, last: int) -> list[ActorTrack]:
+        rows = self._actor_poses[first:last]
         poses = np.array(rows, dtype=np.float64).reshape(len(rows), len(self.actors), 7)
         return [ActorTrack(a.thing.value, *a.looks, poses[:, number]) for number, a in enumerate(self.actors)]

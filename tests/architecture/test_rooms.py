@@ -18,6 +18,7 @@ ALLOWED = {
 }
 CLOCKS = "mbf_abstract/time/"
 SPAWNERS = (
+    "mbf_abstract/access/",
     "mbf_abstract/execution/",
     "mbf_abstract/drive/",
     "mbf_abstract/goals/",

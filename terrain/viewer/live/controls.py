@@ -30,6 +30,8 @@ class LiveControls:
     ----------
     session : Session
     sequence : GoalSequence
+    source, place : str
+        What is served: the source of events about what was asked for, and its name in texts.
 
     Attributes
     ----------
@@ -39,12 +41,15 @@ class LiveControls:
         Whether goals are paused, those to come as well.
     """
 
-    def __init__(self, session: Session, sequence: GoalSequence) -> None:
+    def __init__(
+        self, session: Session, sequence: GoalSequence, source: str = "live_view", place: str = "the live view"
+    ) -> None:
         self.planner = ""
         self.controller = ""
         self.holding = False
         self._session = session
         self._sequence = sequence
+        self._source, self._place = source, place
         self._server = session.navigator.server
         self._waiting: deque[Callable[[], None]] = deque(maxlen=MAX_WAITING)
         self._ground: StaticRays | None = None
@@ -73,14 +78,17 @@ class LiveControls:
             return
         x, y, z = place.tolist()
         robot = self._session.simulation.robot.pose()
-        yaw = math.atan2(y - robot.y, x - robot.x)
-        self._log("new goal", x=round(x, 3), y=round(y, 3), z=round(z, 3))
-        self._sequence.go_to(AskedGoal(Pose.planar(x, y, yaw, z), self.planner, self.controller))
+        self.go_to_pose(Pose.planar(x, y, math.atan2(y - robot.y, x - robot.x), z))
+
+    def go_to_pose(self, goal: Pose) -> None:
+        """Go there."""
+        self._log("new goal", x=round(goal.x, 3), y=round(goal.y, 3), z=round(goal.z, 3))
+        self._sequence.go_to(AskedGoal(goal, self.planner, self.controller))
 
     def cancel(self) -> None:
         """Cancel the present goal."""
         self._log("cancel")
-        self._sequence.cancel("canceled in the live view")
+        self._sequence.cancel(f"canceled in {self._place}")
 
     def hold(self, holding: bool) -> None:
         """Pause all goals, or let them go on."""
@@ -113,4 +121,4 @@ class LiveControls:
 
     def _log(self, what: str, **facts: object) -> None:
         """Log what a visitor has done to the run."""
-        self._session.events.emit(EventKind.CUSTOM, "live_view", what=what, **facts)
+        self._session.events.emit(EventKind.CUSTOM, self._source, what=what, **facts)

@@ -7,12 +7,9 @@ without visitors. If the page fails, the run continues without it.
 from __future__ import annotations
 
 import math
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
-from types import FrameType
 
 from mbf_abstract.access.page_access import LOOPBACK, PageAccess, Role, is_loopback
 from mbf_abstract.events import EventKind
@@ -23,6 +20,7 @@ from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
+from terrain.viewer.live.orderly_end import orderly_ctrl_c
 from terrain.viewer.live.page import LivePage
 from terrain.viewer.live.plots import PERIOD, UNWATCHED_PERIOD, History
 from terrain.viewer.server.page_server import page_server
@@ -127,7 +125,7 @@ class LiveSession:
             server = exits.enter_context(page_server(self._options.port, access, "mbf " + session.scenario.name))
             steered = Role.STEER in access.roles.values()
             self._page = page = LivePage(server, session, self._sequence, self.controls, self._log, steered)
-            exits.enter_context(_ctrl_c(lambda: self.controls.post(lambda: self.controls.end("Ctrl-C"))))
+            exits.enter_context(orderly_ctrl_c(lambda: self.controls.post(lambda: self.controls.end("Ctrl-C"))))
             self.address = access.address(server.get_port(), Role.STEER) or ""
             self.watching_address = access.address(server.get_port(), Role.WATCH) or ""
             self._exits = exits.pop_all()
@@ -180,31 +178,3 @@ class LiveSession:
         if page.is_watched and self._wall.now() >= self._next_frame:
             page.show(time, self._history)
             self._next_frame = self._wall.now() + FRAME_PERIOD
-
-
-@contextmanager
-def _ctrl_c(end: Callable[[], None]) -> Iterator[None]:
-    """Let Ctrl-C end the run in order, so that its results are written; a second one breaks it off."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    handler = _OrderlyEnd(end)
-    signal.signal(signal.SIGINT, handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler.before)
-
-
-class _OrderlyEnd:
-    """Handles one Ctrl-C by ending a run, and those of the other robots of a scenario that are watched, too."""
-
-    def __init__(self, end: Callable[[], None]) -> None:
-        self.before = signal.getsignal(signal.SIGINT)
-        self._end = end
-
-    def __call__(self, number: int, frame: FrameType | None) -> None:
-        signal.signal(signal.SIGINT, self.before)
-        self._end()
-        if isinstance(self.before, _OrderlyEnd):
-            self.before(number, frame)

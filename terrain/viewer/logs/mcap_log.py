@@ -6,9 +6,7 @@ this package. Use ``terrain.viewer.replay`` to look at a run without installing 
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
@@ -16,7 +14,7 @@ from mcap_protobuf.schema import register_schema
 from mbf_abstract.whole_files import replacing
 from terrain.recording.recording import Recording
 from terrain.viewer.logs.foxglove_messages import nanoseconds
-from terrain.viewer.logs.run_messages import JsonMessage, messages_of
+from terrain.viewer.logs.run_messages import TOPICS, bytes_of, json_schema, messages_of
 
 
 def write_mcap(file: str | Path, recording: Recording) -> None:
@@ -28,23 +26,18 @@ def write_mcap(file: str | Path, recording: Recording) -> None:
         facts = {"scenario": recording.scenario, "backend": recording.backend, "robot": recording.robot.name}
         writer.add_metadata("run", facts | verdict)
         channels: dict[str, int] = {}
-        for time, topic, message in messages_of(recording):
-            if topic not in channels:
-                channels[topic] = _add_channel(writer, topic, message)
-            stamp = nanoseconds(time)
-            writer.add_message(channels[topic], stamp, _bytes_of(message), stamp)
+        for one in messages_of(recording):
+            if one.topic not in channels:
+                channels[one.topic] = _add_channel(writer, one.topic)
+            stamp = nanoseconds(one.time)
+            writer.add_message(channels[one.topic], stamp, bytes_of(one.make()), stamp)
         writer.finish()
 
 
-def _add_channel(writer: Writer, topic: str, message: Any) -> int:
-    """Announce a topic with the schema of its first message; all that follow have the same."""
-    if isinstance(message, JsonMessage):
-        schema = writer.register_schema(message.schema, "jsonschema", json.dumps(message.json_schema()).encode())
-        return int(writer.register_channel(topic, "json", schema))
-    return int(writer.register_channel(topic, "protobuf", register_schema(writer, type(message))))
-
-
-def _bytes_of(message: Any) -> bytes:
-    if isinstance(message, JsonMessage):
-        return json.dumps(message.values, sort_keys=True, allow_nan=False).encode()
-    return bytes(message.SerializeToString(deterministic=True))
+def _add_channel(writer: Writer, topic: str) -> int:
+    """Announce a topic with its schema."""
+    schema = TOPICS[topic]
+    if isinstance(schema, str):
+        number = writer.register_schema(schema, "jsonschema", json_schema(schema).encode())
+        return int(writer.register_channel(topic, "json", number))
+    return int(writer.register_channel(topic, "protobuf", register_schema(writer, schema)))

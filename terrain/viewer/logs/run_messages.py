@@ -1,4 +1,4 @@
-"""A recording as a stream of messages by topic, in Foxglove's schemas where there is one and as JSON where not.
+"""A run as a stream of messages by topic, in Foxglove's schemas where there is one and as JSON where not.
 
 ========== ================================ =====================================================
 topic      schema                           contents
@@ -14,6 +14,8 @@ topic      schema                           contents
 /actions   mbf.ActionStates                 what each action does
 /motion    mbf.Motion                       speed, yaw rate, their commands, tilt, cross-track error
 ========== ================================ =====================================================
+
+``RunMessages`` makes them of a recording, whole (run.mcap) or part by part while the run goes on (live).
 """
 
 from __future__ import annotations
@@ -21,29 +23,33 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.Grid_pb2 import Grid
 from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
+from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from mbf_abstract.events import Event, EventKind
-from mbf_abstract.geometry import FloatArray
 from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.recording.metrics import cross_track_errors
-from terrain.recording.recording import Recording
-from terrain.viewer.logs import foxglove_mesh_costs as mesh_costs
+from terrain.recording.recording import Recording, StampedPoints
 from terrain.viewer.logs import foxglove_messages as message
 from terrain.viewer.logs import foxglove_scene as scene
+from terrain.viewer.logs.foxglove_mesh_costs import MeshCosts
+from terrain.viewer.logs.moving_frames import MovingFrames, Track
 from terrain.viewer.reports.event_lines import NOTABLE, event_text
 from terrain.viewer.reports.timeline import ACTIONS
-from terrain.viewer.scene import wheel_angles
 
-TRACK_PIECE = 5.0  # s
 ERRORS = {EventKind.FAULT, EventKind.QUARANTINE, EventKind.SINK_FAILED}
 DETAILS = {EventKind.STATE_CHANGED, EventKind.PLUGIN_CALL_STARTED, EventKind.PLUGIN_CALL_ENDED}
+MAX_PIECES = 10_000  # of the track, 14 hours; then the oldest are replaced
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 MOTION = ("speed", "commanded_speed", "yaw_rate", "commanded_yaw_rate", "tilt_deg", "cross_track_error")
 JSON_FIELDS: dict[str, dict[str, Any]] = {
@@ -51,6 +57,19 @@ JSON_FIELDS: dict[str, dict[str, Any]] = {
     "mbf.ActionStates": dict.fromkeys(ACTIONS, TEXT),
     "mbf.Motion": dict.fromkeys(MOTION, NUMBER),
 }
+TOPICS: dict[str, Any] = {
+    "/tf": FrameTransforms,
+    "/scene": SceneUpdate,
+    "/plan": PosesInFrame,
+    "/scan": PointCloud,
+    "/map": Grid,
+    "/mesh_map": SceneUpdate,
+    "/log": Log,
+    "/events": "mbf.Event",
+    "/actions": "mbf.ActionStates",
+    "/motion": "mbf.Motion",
+}
+"""Of each topic the class of its protobuf messages, or the name of its JSON schema."""
 
 
 @dataclass(frozen=True)
@@ -60,89 +79,179 @@ class JsonMessage:
     schema: str
     values: Mapping[str, Any]
 
-    def json_schema(self) -> dict[str, Any]:
-        """The schema's text: every field it may have."""
-        return {"title": self.schema, "type": "object", "properties": JSON_FIELDS[self.schema]}
+
+def json_schema(name: str) -> str:
+    """Return the text of a schema of our own: every field it may have."""
+    return json.dumps({"title": name, "type": "object", "properties": JSON_FIELDS[name]})
 
 
-Stamped = tuple[float, str, Any]  # time [s], topic, a protobuf message or a JsonMessage
+def bytes_of(made: Any) -> bytes:
+    """Return a protobuf message or a ``JsonMessage`` as it is written."""
+    if isinstance(made, JsonMessage):
+        return json.dumps(made.values, sort_keys=True, allow_nan=False).encode()
+    return bytes(made.SerializeToString(deterministic=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Stamped:
+    """A message that has not been made yet: much of a live run is looked at by nobody.
+
+    Attributes
+    ----------
+    time : float
+        [s] of the run.
+    topic : str
+    make : callable
+        Returns the protobuf message or the ``JsonMessage``.
+    part : str, optional
+        Which part of the present state it shows, so that one who comes later needs the newest message of each part;
+        None of messages that only matter at their time.
+    """
+
+    time: float
+    topic: str
+    make: Callable[[], Any]
+    part: str | None = None
 
 
 def messages_of(recording: Recording) -> list[Stamped]:
     """All messages of a run, in the order of time."""
-    frame, height = recording.start.frame_id, recording.start.z + message.MAP_LIFT
-    streams: list[Iterator[Stamped]] = [
-        ((0.0, "/scene", update) for update in _static_scene(recording)),
-        _transforms(recording),
-        _track(recording),
-        ((time, "/plan", message.poses_along(time, frame, line)) for time, line in recording.paths if len(line)),
-        ((time, "/scan", message.point_cloud(time, frame, points)) for time, points in recording.scans),
-        ((grid.time, "/map", message.grid(frame, grid, height)) for grid in recording.grids),
-        ((mesh.time, "/mesh_map", update) for mesh, update in mesh_costs.updates(frame, recording.meshes)),
-        ((event.time, "/log", _log(event)) for event in recording.events),
-        ((event.time, "/events", _event(event)) for event in recording.events),
-        action_states(recording.events),
-        _motion(recording),
-    ]
-    return sorted(itertools.chain(*streams), key=lambda stamped: stamped[0])
+    maker = RunMessages(recording)
+    return _in_order([*maker.take(recording), *maker.end()])
 
 
-def _static_scene(recording: Recording) -> Iterator[Any]:
-    """Shapes of what stands and what moves; the poses of moving things are on ``/tf``."""
-    yield scene.world(recording)
-    yield scene.robot(recording.robot)
-    if recording.actors:
-        yield scene.actors(recording.actors)
+class RunMessages:
+    """Makes the messages of a run from its recording, whole or in parts that follow each other.
+
+    Parameters
+    ----------
+    first : Recording
+        The first part: where the run starts, the robot and the world.
+    began : float
+        Time [s] of what is there from the start.
+    """
+
+    def __init__(self, first: Recording, began: float = 0.0) -> None:
+        self._began = began
+        self._frame, self._height = first.start.frame_id, first.start.z + message.MAP_LIFT
+        self._scene: list[Stamped] | None = list(_static_scene(first, began))
+        self._moving = MovingFrames(first.robot, self._frame)
+        self._track = Track()
+        self._mesh = MeshCosts(self._frame)
+        self._actions = ActionStates()
+        self._plan: list[StampedPoints] = []
+
+    def take(self, part: Recording) -> list[Stamped]:
+        """Return the messages of the next part, in the order of time."""
+        streams = [
+            self._opening(),
+            self._moving_frames(part),
+            self._pieces(self._track.take(part.times, part.poses)),
+            self._plans(part),
+            self._seen(part),
+            self._maps(part),
+            self._events(part.events),
+            self._motion(part),
+        ]
+        return _in_order(itertools.chain(*streams))
+
+    def end(self) -> list[Stamped]:
+        """Return what is left at the end: the last piece of the track."""
+        return list(self._pieces(self._track.end()))
+
+    def _opening(self) -> Iterator[Stamped]:
+        """What stands, and what the actions do, before anything has happened; once."""
+        if self._scene is not None:
+            yield from self._scene
+            yield _json(self._began, "/actions", "mbf.ActionStates", self._actions.states, part="")
+            self._scene = None
+
+    def _moving_frames(self, part: Recording) -> Iterator[Stamped]:
+        for time, make in self._moving.take(part):
+            yield Stamped(time, "/tf", make, part="")
+
+    def _pieces(self, pieces: Iterable[tuple[int, float, Any]]) -> Iterator[Stamped]:
+        for number, time, line in pieces:
+            yield Stamped(
+                time, "/scene", partial(scene.track_piece, self._frame, number, time, line), f"track {number}"
+            )
+
+    def _plans(self, part: Recording) -> Iterator[Stamped]:
+        for time, line in part.paths:
+            if len(line):
+                yield Stamped(time, "/plan", partial(message.poses_along, time, self._frame, line), part="")
+
+    def _seen(self, part: Recording) -> Iterator[Stamped]:
+        for time, points in part.scans:
+            yield Stamped(time, "/scan", partial(message.point_cloud, time, self._frame, points), part="")
+
+    def _maps(self, part: Recording) -> Iterator[Stamped]:
+        for grid in part.grids:
+            yield Stamped(grid.time, "/map", partial(message.grid, self._frame, grid, self._height), part="")
+        for mesh in part.meshes:
+            drawn, make = self._mesh.take(mesh)
+            yield Stamped(mesh.time, "/mesh_map", make, drawn)
+
+    def _events(self, events: Iterable[Event]) -> Iterator[Stamped]:
+        for event in events:
+            yield Stamped(event.time, "/log", partial(_log, event))
+            yield Stamped(event.time, "/events", partial(_event, event))
+            if self._actions.take(event):
+                yield _json(event.time, "/actions", "mbf.ActionStates", self._actions.states, part="")
+
+    def _motion(self, part: Recording) -> Iterator[Stamped]:
+        twists, commands = part.twists, part.commands
+        off = cross_track_errors(replace(part, paths=[*self._plan, *part.paths]))
+        self._plan = [*self._plan, *part.paths][-1:]
+        columns = (twists[:, 0], commands[:, 0], twists[:, 2], commands[:, 2], np.degrees(part.tilt), off)
+        for time, row in zip(part.times.tolist(), np.column_stack(columns).round(6).tolist(), strict=True):
+            finite = {name: value for name, value in zip(MOTION, row, strict=True) if math.isfinite(value)}
+            yield _json(time, "/motion", "mbf.Motion", finite)
 
 
-def action_states(events: tuple[Event, ...]) -> Iterator[Stamped]:
-    """What every action does, whenever that changes: idle, active, or the outcome of its last goal."""
-    states, newest = dict.fromkeys(ACTIONS, "idle"), dict.fromkeys(ACTIONS)
-    yield 0.0, "/actions", JsonMessage("mbf.ActionStates", dict(states))
-    for event in events:
+class ActionStates:
+    """What every action does: idle, active, or the outcome of its last goal.
+
+    Attributes
+    ----------
+    states : dict of str to str
+        By action; another one after each change.
+    """
+
+    def __init__(self) -> None:
+        self.states: dict[str, str] = dict.fromkeys(ACTIONS, "idle")
+        self._newest: dict[str, Any] = {}
+
+    def take(self, event: Event) -> bool:
+        """Take the next event; returns whether it has changed a state."""
         action, goal = event.source, event.data.get("goal_id")
-        if action not in states:
-            continue
+        if action not in self.states:
+            return False
         if event.kind is EventKind.GOAL_ACCEPTED:
-            states[action], newest[action] = "active", goal
-        elif event.kind is EventKind.GOAL_FINISHED and goal == newest[action]:
+            state, self._newest[action] = "active", goal
+        elif event.kind is EventKind.GOAL_FINISHED and goal == self._newest.get(action):
             code = event.data.get("outcome")
-            states[action] = outcome_name(code) if isinstance(code, int) else "finished"
+            state = outcome_name(code) if isinstance(code, int) else "finished"
         else:
-            continue
-        yield event.time, "/actions", JsonMessage("mbf.ActionStates", dict(states))
+            return False
+        self.states = self.states | {action: state}
+        return True
 
 
-def _transforms(recording: Recording) -> Iterator[Stamped]:
-    shape, frame = recording.robot, recording.start.frame_id
-    angles = wheel_angles(shape, recording.times, recording.twists)
-    for sample, (time, row) in enumerate(zip(recording.times.tolist(), recording.poses, strict=True)):
-        body = message.transform(time, frame, "base_link", row[:3], row[3:])
-        wheels = [
-            message.transform(time, "base_link", scene.wheel_frame(index), centre, _about_y(angle))
-            for index, (centre, angle) in enumerate(zip(shape.wheels, angles[sample].tolist(), strict=True))
-        ]
-        actors = [
-            message.transform(time, frame, scene.actor_frame(index), track.poses[sample, :3], track.poses[sample, 3:])
-            for index, track in enumerate(recording.actors)
-        ]
-        yield time, "/tf", FrameTransforms(transforms=[body, *wheels, *actors])
+def _in_order(messages: Iterable[Stamped]) -> list[Stamped]:
+    return sorted(messages, key=lambda stamped: stamped.time)
 
 
-def _about_y(angle: float) -> FloatArray:
-    return np.array([0.0, math.sin(angle / 2.0), 0.0, math.cos(angle / 2.0)])
+def _json(time: float, topic: str, schema: str, values: Mapping[str, Any], part: str | None = None) -> Stamped:
+    return Stamped(time, topic, partial(JsonMessage, schema, values), part)
 
 
-def _track(recording: Recording) -> Iterator[Stamped]:
-    """Pieces of the driven track, each when it has been driven."""
-    ends = np.arange(TRACK_PIECE, recording.duration + TRACK_PIECE, TRACK_PIECE)
-    last = 0
-    for number, end in enumerate(np.searchsorted(recording.times, ends)):
-        index = min(int(end), len(recording.times) - 1)
-        if index > last:
-            time, line = float(recording.times[index]), recording.poses[last : index + 1, :3]
-            yield time, "/scene", scene.track_piece(recording.start.frame_id, number, time, line)
-        last = index
+def _static_scene(recording: Recording, time: float) -> Iterator[Stamped]:
+    """Shapes of what stands and what moves; the poses of moving things are on ``/tf``."""
+    yield Stamped(time, "/scene", partial(scene.world, recording), "world")
+    yield Stamped(time, "/scene", partial(scene.robot, recording.robot), "robot")
+    if recording.actors:
+        yield Stamped(time, "/scene", partial(scene.actors, recording.actors), "actors")
 
 
 def _log(event: Event) -> Log:
@@ -162,12 +271,3 @@ def _level(event: Event) -> Log.Level.ValueType:
 
 def _event(event: Event) -> JsonMessage:
     return JsonMessage("mbf.Event", json.loads(event.to_json()))
-
-
-def _motion(recording: Recording) -> Iterator[Stamped]:
-    twists, commands = recording.twists, recording.commands
-    tilt, off = np.degrees(recording.tilt), cross_track_errors(recording)
-    columns = (twists[:, 0], commands[:, 0], twists[:, 2], commands[:, 2], tilt, off)
-    for time, row in zip(recording.times.tolist(), np.column_stack(columns).round(6).tolist(), strict=True):
-        finite = {name: value for name, value in zip(MOTION, row, strict=True) if math.isfinite(value)}
-        yield time, "/motion", JsonMessage("mbf.Motion", finite)

@@ -13,13 +13,13 @@ import pytest
 import roslibpy
 import trimesh
 
+from mbf_abstract.access.web_socket_server import ServerOptions
 from mbf_abstract.geometry import Pose
 from mbf_abstract.server.factory import read_config
 from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
-from mbf_ros.rosbridge.server import ServerOptions
 from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
 from mbf_ros.rosbridge_robot.navigator import connect_navigator
 from mbf_ros.rosbridge_robot.options import RobotOptions

@@ -11,12 +11,12 @@ import pytest
 from typer.testing import CliRunner
 
 from mbf_abstract.access.page_access import PageAccess, Role
+from mbf_abstract.access.web_socket_server import ServerOptions
 from mbf_abstract.cli import make_app
 from mbf_abstract.geometry import Pose
 from mbf_abstract.server.factory import read_config
 from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_abstract.time.clock import WallClock
-from mbf_ros.rosbridge.server import ServerOptions
 from mbf_ros.rosbridge.serving import BridgeOptions
 from mbf_ros.rosbridge_robot.simulated_robot import serve_robot
 

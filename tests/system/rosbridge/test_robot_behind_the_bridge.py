@@ -8,6 +8,7 @@ from contextlib import suppress
 import pytest
 from websockets.exceptions import ConnectionClosed
 
+from mbf_abstract.access.web_socket_server import ServerOptions
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.geometry import Pose
@@ -17,7 +18,6 @@ from mbf_abstract.session import NavigationSession
 from mbf_abstract.testing.scripted_session import SCRIPTED, MapFreeServer, _spec
 from mbf_abstract.time.clock import WallClock
 from mbf_ros.ros2.robot import Frames
-from mbf_ros.rosbridge.server import ServerOptions
 from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
 from mbf_ros.rosbridge_robot.topic_robot import TopicRobot
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mbf_abstract.access.outbox import Outbox
 from mbf_abstract.access.page_access import Role
 from mbf_abstract.events import EventKind
 from mbf_abstract.testing.scripted_session import ScriptedSession
@@ -19,7 +20,6 @@ from mbf_ros.rosbridge.authentication import Authentication
 from mbf_ros.rosbridge.bridge import Bridge
 from mbf_ros.rosbridge.client import Client
 from mbf_ros.rosbridge.navigation import ACTIONS, NODE, ServerParameters, serve_navigator
-from mbf_ros.rosbridge.outbox import Outbox
 from mbf_ros.rosbridge.rosapi import serve_rosapi
 
 OPERATIONS = (

@@ -164,7 +164,7 @@ def contents_of():
     return contents
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def meadow() -> Scenario:
     """Gentle open ground, six metres to go, for runs that are watched."""
     world = GeneratedWorld(type="generated", size=(12.0, 10.0), spacing=0.25, median_slope=5.0)

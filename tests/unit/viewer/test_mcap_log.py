@@ -21,7 +21,7 @@ from terrain.recording.verdict import Verdict
 from terrain.session.session import Session
 from terrain.viewer.logs.foxglove_messages import MAP_LIFT, nanoseconds
 from terrain.viewer.logs.mcap_log import write_mcap
-from terrain.viewer.logs.run_messages import action_states
+from terrain.viewer.logs.run_messages import ActionStates
 from terrain.viewer.pictures.colours import WALL
 
 SCHEMAS = {
@@ -209,9 +209,10 @@ def test_a_goal_that_was_replaced_does_not_end_its_action():
         Event(3.0, EventKind.GOAL_FINISHED, "exe_path", {"goal_id": 2, "outcome": 0}),
     )
 
-    states = [(time, message.values["exe_path"]) for time, _, message in action_states(events)]
+    actions = ActionStates()
+    states = [(event.time, actions.states["exe_path"]) for event in events if actions.take(event)]
 
-    assert states == [(0.0, "idle"), (1.0, "active"), (2.0, "active"), (3.0, "SUCCESS")]
+    assert states == [(1.0, "active"), (2.0, "active"), (3.0, "SUCCESS")]
 
 
 def test_the_motion_is_plotted_in_plain_numbers(log, office):

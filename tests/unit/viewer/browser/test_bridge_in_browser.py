@@ -5,11 +5,11 @@ import io
 import pytest
 from PIL import Image
 
+from mbf_abstract.access.web_socket_server import ServerOptions
 from mbf_abstract.geometry import Pose
 from mbf_abstract.server.factory import read_config
 from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_abstract.time.clock import WallClock
-from mbf_ros.rosbridge.server import ServerOptions
 from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
 
 pytestmark = pytest.mark.timeout(300)

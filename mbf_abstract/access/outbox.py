@@ -10,6 +10,9 @@ import asyncio
 from collections import OrderedDict, deque
 from collections.abc import Hashable
 
+Frame = str | bytes
+"""A text or a binary frame of a WebSocket."""
+
 MAX_ANSWERS = 1000
 
 
@@ -26,14 +29,14 @@ class WaitingFrames:
         self.overflowed = False
         self._max_answers = max_answers
         self._answers = 0
-        self._waiting: OrderedDict[Hashable, deque[str]] = OrderedDict()
+        self._waiting: OrderedDict[Hashable, deque[Frame]] = OrderedDict()
 
     @property
     def is_empty(self) -> bool:
         """Whether all frames have been taken."""
         return not self._waiting
 
-    def answer(self, frame: str) -> None:
+    def answer(self, frame: Frame) -> None:
         """Add a frame that must not be lost."""
         self._answers += 1
         if self._answers > self._max_answers:
@@ -41,7 +44,7 @@ class WaitingFrames:
         else:
             self._waiting[object()] = deque([frame])
 
-    def newest(self, kind: Hashable, frame: str, keep: int = 1) -> None:
+    def newest(self, kind: Hashable, frame: Frame, keep: int = 1) -> None:
         """Add a frame of which only the newest ``keep`` of its kind matter."""
         frames = self._waiting.setdefault(kind, deque())
         while len(frames) >= keep:
@@ -52,7 +55,7 @@ class WaitingFrames:
         """Drop what waits of a kind."""
         self._waiting.pop(kind, None)
 
-    def pop(self) -> str:
+    def pop(self) -> Frame:
         """Return the next frame, one kind after the other; raises StopIteration where none waits."""
         kind, frames = next(iter(self._waiting.items()))
         frame = frames.popleft()
@@ -72,17 +75,17 @@ class Outbox(WaitingFrames):
         super().__init__(max_answers)
         self._ready = asyncio.Event()
 
-    def answer(self, frame: str) -> None:
+    def answer(self, frame: Frame) -> None:
         """Add a frame that must not be lost."""
         super().answer(frame)
         self._ready.set()
 
-    def newest(self, kind: Hashable, frame: str, keep: int = 1) -> None:
+    def newest(self, kind: Hashable, frame: Frame, keep: int = 1) -> None:
         """Add a frame of which only the newest ``keep`` of its kind matter."""
         super().newest(kind, frame, keep)
         self._ready.set()
 
-    async def take(self) -> str:
+    async def take(self) -> Frame:
         """Wait for the next frame."""
         while self.is_empty:
             self._ready.clear()

@@ -1,4 +1,4 @@
-"""The WebSocket server in front of a bridge: who is let in, frames in and out, and the page that it serves.
+"""A WebSocket server: who is let in, frames in and out, and pages that it serves.
 
 It runs on a thread and an event loop of its own. Other threads hand it work with ``post`` and never wait for it.
 """
@@ -12,17 +12,17 @@ import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic
 
 from mbf_abstract.access.page_access import PageAccess
+from mbf_abstract.access.visitor import AnyVisitor, Service, Visitor
 from mbf_abstract.events import EventBus, EventKind
 from mbf_abstract.time.clock import ClockThread, WallClock
-from mbf_ros.rosbridge.bridge import Bridge
-from mbf_ros.rosbridge.client import Client
 
 POLICY_VIOLATION, TRY_AGAIN_LATER = 1008, 1013  # WebSocket close codes (RFC 6455, 7.4.1)
 TIME_TO_AUTHENTICATE = 10.0  # s
 TIME_TO_START, TIME_TO_SEND, TIME_TO_STOP = 10.0, 0.5, 3.0  # s
+MOST_REFUSALS = 20  # that are noted
 WRITE_LIMIT = 32 * 1024  # bytes on their way to one client, after which frames wait in its outbox
 SECURITY_HEADERS = {
     "Referrer-Policy": "no-referrer",  # the token is in the address
@@ -46,36 +46,63 @@ class ServerOptions:
     access : PageAccess
         Interface and tokens; without a token everybody is let in who can reach a loopback interface.
     port : int
-        0 takes a free one.
+        The first one tried; 0 takes a free one.
     origins : tuple of str
         Origins of web pages that may connect, beside the page that the server has served itself.
     max_message : int
         Longest message of a client [bytes].
     max_clients : int
+    ports : int
+        How many are tried, one after the other.
     """
 
     access: PageAccess = field(default_factory=PageAccess.open)
-    port: int = 9090
+    port: int = 0
     origins: tuple[str, ...] = ()
     max_message: int = 10_000_000
     max_clients: int = 50
+    ports: int = 1
 
 
 class ServerError(Exception):
     """The server cannot listen; the text says why."""
 
 
-class RosbridgeServer:
-    """Serves a bridge from ``start`` until it is closed.
+@dataclass(frozen=True)
+class Offer:
+    """What a server offers beside its service.
+
+    Attributes
+    ----------
+    name : str
+        Of the source of its events.
+    extra : str
+        Extra of this package that brings websockets.
+    origin_option : str
+        Option of the command line that lets the pages of an origin in.
+    subprotocols : tuple of str
+        Those that it speaks, the best first; a client must speak one of them. Without any, none is negotiated.
+    pages : mapping of str to (str, bytes)
+        Content type and content of each path that is answered over HTTP.
+    """
+
+    name: str
+    extra: str
+    origin_option: str
+    subprotocols: tuple[str, ...] = ()
+    pages: Mapping[str, tuple[str, bytes]] = field(default_factory=dict)
+
+
+class WebSocketServer(Generic[AnyVisitor]):
+    """Serves from ``start`` until it is closed.
 
     Parameters
     ----------
-    bridge : Bridge
+    service : Service
     events : EventBus
-        Learns who comes and goes.
+        Learns who comes and goes, and who is refused.
     options : ServerOptions
-    pages : mapping of str to (str, bytes)
-        Content type and content of each path that is answered over HTTP.
+    offer : Offer
 
     Attributes
     ----------
@@ -88,29 +115,25 @@ class RosbridgeServer:
         The package websockets is missing.
     """
 
-    def __init__(
-        self,
-        bridge: Bridge,
-        events: EventBus,
-        options: ServerOptions,
-        pages: Mapping[str, tuple[str, bytes]] | None = None,
-    ) -> None:
+    def __init__(self, service: Service[AnyVisitor], events: EventBus, options: ServerOptions, offer: Offer) -> None:
         try:
             import websockets.asyncio.server  # noqa: F401
         except ImportError as error:
-            raise ServerError(f"rosbridge needs websockets: pip install 'mbf-flex[bridge]' ({error})") from error
+            text = f"{offer.name} needs websockets: pip install 'mbf-flex[{offer.extra}]' ({error})"
+            raise ServerError(text) from error
         self.port = 0
-        self._bridge, self._events, self._options, self._pages = bridge, events, options, dict(pages or {})
+        self._service, self._events, self._options, self._offer = service, events, options, offer
         self._loop = asyncio.new_event_loop()
         self._end: asyncio.Event | None = None
-        self._clients: set[Client] = set()
+        self._visitors: set[AnyVisitor] = set()
+        self._refused: set[str] = set()
         self._started = threading.Event()
         self._problem: BaseException | None = None
         self._thread: ClockThread | None = None
 
     def start(self) -> None:
         """Listen; raises ServerError where nothing can listen there."""
-        self._thread = WallClock().spawn(self._run, "rosbridge")
+        self._thread = WallClock().spawn(self._run, self._offer.name)
         self._started.wait(TIME_TO_START)
         if self._problem is not None:
             host, port = self._options.access.host, self._options.port
@@ -139,19 +162,8 @@ class RosbridgeServer:
             self._loop.close()
 
     async def _serve(self) -> None:
-        from websockets.asyncio.server import serve
-
         self._end = asyncio.Event()
-        async with serve(
-            self._handle,
-            self._options.access.host,
-            self._options.port,
-            process_request=self._answer_request,
-            max_size=self._options.max_message,
-            write_limit=WRITE_LIMIT,
-            compression=None,
-            logger=_logger,
-        ) as server:
+        async with await self._listen() as server:
             self.port = next(iter(server.sockets)).getsockname()[1]
             self._started.set()
             await self._end.wait()
@@ -160,22 +172,45 @@ class RosbridgeServer:
         for task in asyncio.all_tasks() - {asyncio.current_task()}:
             task.cancel()
 
+    async def _listen(self) -> Any:
+        """Listen at the first port that is free; raises OSError where none is."""
+        from websockets.asyncio.server import serve
+        from websockets.typing import Subprotocol
+
+        for port in range(self._options.port, last := self._options.port + self._options.ports):
+            try:
+                return await serve(
+                    self._handle,
+                    self._options.access.host,
+                    port,
+                    process_request=self._answer_request,
+                    subprotocols=[Subprotocol(name) for name in self._offer.subprotocols] or None,
+                    max_size=self._options.max_message,
+                    write_limit=WRITE_LIMIT,
+                    compression=None,
+                    logger=_logger,
+                )
+            except OSError:
+                if port + 1 == last:
+                    raise
+
     async def _until_sent(self) -> None:
         """Wait until nothing waits in the outboxes, so that the last command reaches its robot."""
-        while not all(client.outbox.is_empty for client in self._clients):
+        while not all(client.outbox.is_empty for client in self._visitors):
             await asyncio.sleep(0.01)
 
     def _answer_request(self, connection: Any, request: Any) -> Any:
         """Refuse a request, answer it with a page, or let the WebSocket begin (None)."""
         refused = self._refusal(request.path, request.headers)
         if refused is not None:
+            self._note_refusal(refused[1])
             return connection.respond(refused[0], f"{refused[1]}\n")
         if request.headers.get("Upgrade", "").lower() == "websocket":
             return None
         found = self._options.access.role_and_path(request.path)
         if found is None:
             return connection.respond(http.HTTPStatus.FORBIDDEN, "the address needs the token\n")
-        page = self._pages.get(found[1])
+        page = self._offer.pages.get(found[1])
         if page is None:
             return connection.respond(http.HTTPStatus.NOT_FOUND, "there is no such page\n")
         response = connection.respond(http.HTTPStatus.OK, "")
@@ -184,6 +219,12 @@ class RosbridgeServer:
         response.headers.update({**SECURITY_HEADERS, "Content-Type": page[0], "Content-Length": str(len(page[1]))})
         return response
 
+    def _note_refusal(self, text: str) -> None:
+        """Let the user know who is refused and why; each text once, and not without end."""
+        if text not in self._refused and len(self._refused) < MOST_REFUSALS:
+            self._refused.add(text)
+            self._events.emit(EventKind.CUSTOM, self._offer.name, refused=text)
+
     def _refusal(self, path: str, headers: Any) -> tuple[http.HTTPStatus, str] | None:
         """Why a request is refused, None if it is not; programs that are no browser send no ``Origin``."""
         access, hosts, origins = self._options.access, headers.get_all("Host"), headers.get_all("Origin")
@@ -191,7 +232,7 @@ class RosbridgeServer:
             return http.HTTPStatus.FORBIDDEN, "this is not the name of the machine that serves"
         own = origins and access.is_same_site(origins[0], hosts[0])
         if len(origins) > 1 or (origins and not own and origins[0] not in self._options.origins):
-            return http.HTTPStatus.FORBIDDEN, f"a page of {origins[0]} may not connect; see --allow-origin"
+            return http.HTTPStatus.FORBIDDEN, f"a page of {origins[0]} may not connect; see {self._offer.origin_option}"
         if path not in ("", "/") and access.role_and_path(path) is None:
             return http.HTTPStatus.FORBIDDEN, "the token in the address is wrong"
         return None
@@ -200,7 +241,7 @@ class RosbridgeServer:
         """Serve one client until it is gone."""
         from websockets.exceptions import ConnectionClosed
 
-        if len(self._clients) >= self._options.max_clients:
+        if len(self._visitors) >= self._options.max_clients:
             await connection.close(TRY_AGAIN_LATER, "too many clients")
             return
         client = self._welcome(connection)
@@ -208,7 +249,7 @@ class RosbridgeServer:
         authenticating = asyncio.create_task(self._await_token(client))
         try:
             async for frame in connection:
-                self._bridge.take(client, frame)
+                self._service.take(client, frame)
                 if client.outbox.overflowed:
                     client.hang_up("too many answers wait to be read")
                     break
@@ -218,11 +259,11 @@ class RosbridgeServer:
         finally:
             sending.cancel()
             authenticating.cancel()
-            self._clients.discard(client)
-            self._bridge.forget(client)
-            self._events.emit(EventKind.CUSTOM, "rosbridge", message="client gone", client=client.name)
+            self._visitors.discard(client)
+            self._service.forget(client)
+            self._events.emit(EventKind.CUSTOM, self._offer.name, message="client gone", client=client.name)
 
-    def _welcome(self, connection: Any) -> Client:
+    def _welcome(self, connection: Any) -> AnyVisitor:
         found = self._options.access.role_and_path(connection.request.path)
         address = connection.remote_address or ("?", 0)
 
@@ -230,13 +271,13 @@ class RosbridgeServer:
             closing = connection.close(POLICY_VIOLATION, reason)
             self._loop.call_soon(lambda: asyncio.ensure_future(closing))
 
-        client = Client(f"{address[0]}:{address[1]}", found[0] if found else None, hang_up)
-        self._clients.add(client)
-        self._events.emit(EventKind.CUSTOM, "rosbridge", message="client connected", client=client.name)
+        client = self._service.welcome(f"{address[0]}:{address[1]}", found[0] if found else None, hang_up)
+        self._visitors.add(client)
+        self._events.emit(EventKind.CUSTOM, self._offer.name, message="client connected", client=client.name)
         return client
 
     @staticmethod
-    async def _send(client: Client, connection: Any) -> None:
+    async def _send(client: Visitor, connection: Any) -> None:
         """Send what is in the outbox; ``send`` waits for a client that reads slowly, and nobody waits for ``send``."""
         from websockets.exceptions import ConnectionClosed
 
@@ -247,7 +288,7 @@ class RosbridgeServer:
             return
 
     @staticmethod
-    async def _await_token(client: Client) -> None:
+    async def _await_token(client: Visitor) -> None:
         if client.role is None:
             await asyncio.sleep(TIME_TO_AUTHENTICATE)
             if client.role is None:

@@ -1,0 +1,69 @@
+"""The options ``--view`` and ``--foxglove`` of ``mbf run``: a run that is watched and steered while it goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from terrain.commands.live_line import LiveLine
+    from terrain.session.goal_sequence import GoalSequence
+    from terrain.session.run_options import RunOptions, Watch
+    from terrain.session.session import Session
+    from terrain.viewer.foxglove.options import FoxgloveOptions
+    from terrain.viewer.live.session import ViewOptions
+
+
+def watched(
+    options: RunOptions, page: ViewOptions | None, foxglove: FoxgloveOptions | None, speed: float, live: LiveLine
+) -> RunOptions:
+    """Serve a page of the run, the app Foxglove, or both; ``speed`` is in simulated seconds per second."""
+    watches: list[Watch] = []
+    if page is not None:
+        watches.append(_live_view(page, live))
+    if foxglove is not None:
+        watches.append(_live_foxglove(foxglove, speed, live))
+
+    @contextmanager
+    def watch(session: Session, goals: GoalSequence) -> Iterator[None]:
+        with ExitStack() as served:
+            for one in watches:
+                served.enter_context(one(session, goals))
+            yield
+
+    return replace(options, watch=watch) if watches else options
+
+
+def _live_view(page: ViewOptions, live: LiveLine) -> Watch:
+    """Return what serves the page of a session while it runs, and prints its address."""
+    from terrain.viewer.live.session import LiveSession
+
+    def watch(session: Session, goals: GoalSequence) -> LiveSession:
+        title = _title("live view", session)
+        return LiveSession(session, goals, page, lambda at: live.note(f"{title} at {at}"), live.note)
+
+    return watch
+
+
+def _live_foxglove(options: FoxgloveOptions, speed: float, live: LiveLine) -> Watch:
+    """Return what serves a session to Foxglove while it runs, and prints the address.
+
+    Raises
+    ------
+    ValueError
+        A package is missing.
+    """
+    try:
+        from terrain.viewer.foxglove.live import LiveFoxglove
+    except ImportError as error:
+        raise ValueError(f"--foxglove needs more packages: pip install 'mbf-flex[foxglove]' ({error})") from error
+
+    return lambda session, goals: LiveFoxglove(session, goals, options, speed, live.note, _title("Foxglove", session))
+
+
+def _title(what: str, session: Session) -> str:
+    """What is served; of one of several robots with its name."""
+    _, _, name = session.scenario.name.partition("/")
+    return f"{what} of {name}" if name else what

@@ -1,0 +1,77 @@
+"""Where a server for Foxglove listens, and for whom."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mbf_abstract.access.page_access import LOOPBACK, PageAccess, Role, is_loopback
+from mbf_abstract.access.web_socket_server import ServerOptions
+
+APP = "https://app.foxglove.dev"
+PORTS_TRIED = 20
+MAX_MESSAGE = 1_000_000  # bytes of a client's message
+
+
+@dataclass(frozen=True)
+class FoxgloveOptions:
+    """Options of a server.
+
+    Attributes
+    ----------
+    host : str
+        Interface to listen at.
+    port : int
+        The first one tried; the next free one is taken. 0 takes any.
+    token : bool
+        Put a token into the address, so that only those who know it have access.
+    read_only : bool
+        Watching only; else there are two addresses, one to steer and one to watch.
+    origins : tuple of str
+        Origins of web pages that may connect, beside Foxglove's own app.
+
+    Raises
+    ------
+    ValueError
+        No token on an interface that other machines can reach.
+    """
+
+    host: str = LOOPBACK
+    port: int = 8765
+    token: bool = True
+    read_only: bool = False
+    origins: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.token and not is_loopback(self.host):
+            raise ValueError(f"without a token Foxglove is served at loopback only, not at {self.host!r}")
+
+    def server_options(self) -> ServerOptions:
+        """Return the options of the server, with new tokens each time."""
+        access = (PageAccess.by_token if self.token else PageAccess.open)(self.host, self.read_only)
+        return ServerOptions(access, self.port, (APP, *self.origins), MAX_MESSAGE, ports=PORTS_TRIED)
+
+
+def parsed_address(text: str) -> tuple[str, int]:
+    """Return host and port of ``HOST:PORT``, ``HOST`` or ``:PORT``; raises ValueError where the port is none."""
+    host, colon, port = text.rpartition(":")
+    if not colon or text.endswith("]"):
+        host, port = text, str(FoxgloveOptions.port)
+    if not port.isdecimal() or int(port) > 65535:
+        raise ValueError(f"--foxglove-at {text}: expected HOST:PORT with a port from 0 to 65535")
+    return host.strip("[]") or LOOPBACK, int(port)
+
+
+def report_addresses(options: ServerOptions, port: int, note: Callable[[str], None], title: str = "Foxglove") -> None:
+    """Say where the app connects to, and what its user should know."""
+    access = options.access
+    addresses = {role: (access.address(port, role) or "").replace("http", "ws", 1) for role in Role}
+    note(f"{title}: open connection, Foxglove WebSocket, {addresses[Role.STEER] or addresses[Role.WATCH]}")
+    if addresses[Role.STEER] and addresses[Role.WATCH]:
+        note(f"for those who may only watch: {addresses[Role.WATCH]}")
+    if not is_loopback(access.host):
+        drives = "can drive the robot" if addresses[Role.STEER] else "sees all of it"
+        note(
+            f"warning: other machines can reach {access.host}, and nothing is encrypted; who has or overhears the "
+            f"address {drives}"
+        )
