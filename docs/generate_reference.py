@@ -4,14 +4,16 @@
     python docs/generate_reference.py --check    write nothing; exit code 1 and the names of pages that are out of date
 
 Written are ``configuration.md`` (every parameter of every model), the example plugins (what ``mbf new`` writes), the
-listings in the guides (the text of the example files), the table of metrics in ``verdict.md``, that of a robot's
-keys in ``your_robot.md`` and the table of ``faults_and_promises.md`` (the docstrings of ``tests/faults``).
+listings in the guides (the text of the example files), the table of metrics in ``verdict.md``, that of a robot's keys
+in ``your_robot.md``, tables of the parameter models that a page names, and the table of ``faults_and_promises.md``
+(the docstrings of ``tests/faults``).
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import importlib
 import inspect
 import re
 import sys
@@ -41,6 +43,7 @@ LISTING = re.compile(r"(<!-- listing: (?P<file>\S+) -->\n)(?:```python\n.*?\n```
 TABLE = re.compile(r"(<!-- table: tests/faults -->\n)(?:\|.*\n)*")
 METRICS = re.compile(r"(<!-- table: metrics -->\n)(?:\|.*\n)*")
 ROBOT = re.compile(r"(<!-- table: robot -->\n)(?:\|.*\n)*")
+MODEL = re.compile(r"(<!-- table: (?P<module>[\w.]+):(?P<name>\w+) -->\n)(?:\|.*\n)*")
 METRIC = re.compile(r"^(?P<names>\w[\w, ]*) : .*\n(?P<text>(?: {4}.*\n?)+)", re.MULTILINE)
 FAULT_ROW = re.compile(r"Fault table, rows? (?P<rows>[\d, and]+)[^:]*: (?P<text>.+)", re.DOTALL)
 
@@ -54,6 +57,7 @@ def generate() -> dict[Path, str]:
         if page not in texts:
             text = LISTING.sub(lambda match: _listing(match, texts), page.read_text(encoding="utf-8"))
             text = TABLE.sub(lambda match: match[1] + fault_table(), text)
+            text = MODEL.sub(_model_table, text)
             text = ROBOT.sub(lambda match: match[1] + parameter_table(UrdfRobot, dynamic=False), text)
             texts[page] = METRICS.sub(lambda match: match[1] + metrics_table(), text)
     return texts
@@ -74,6 +78,12 @@ def _listing(match: re.Match[str], texts: dict[Path, str]) -> str:
     file = REPOSITORY / match["file"]
     source = texts.get(file) or file.read_text(encoding="utf-8")
     return f"{match[1]}```python\n{source.rstrip()}\n```\n"
+
+
+def _model_table(match: re.Match[str]) -> str:
+    """Put the table of the named parameter model below its marker."""
+    model = getattr(importlib.import_module(match["module"]), match["name"])
+    return match[1] + parameter_table(model, dynamic=False)
 
 
 def fault_table() -> str:

@@ -100,6 +100,7 @@ class CostmapNavigationServer(MapServer):
             navigation_map=bound,
             maps={"local": self.local_costmap, "global": self.global_costmap},
             transforms=self.runtime.transforms,
+            scans=self.scans,
         )
 
     ground_is_level = True

@@ -187,7 +187,8 @@ class MeshNavigationServer(MapServer):
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add the mesh map."""
-        return MeshContext(**vars(base), navigation_map=self.mesh_map, transforms=self.runtime.transforms)
+        transforms = self.runtime.transforms
+        return MeshContext(**vars(base), navigation_map=self.mesh_map, transforms=transforms, scans=self.scans)
 
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
         """Heights of all surfaces at a place, the lowest free one first; see ``ground.ground_heights``."""

@@ -77,6 +77,7 @@ def examine() -> Iterator[Finding]:
         yield _package(name, "only for .las and .laz in mbf map build: pip install 'mbf-flex[maps]'", optional=True)
     yield _package("websockets", "only for mbf bridge serve: pip install 'mbf-flex[bridge]'", optional=True)
     yield _package("rosbags", "only for mbf bag: pip install 'mbf-flex[bags]'", optional=True)
+    yield _package("gymnasium", "only for terrain.learning: pip install 'mbf-flex[gym]'", optional=True)
     yield _package("rerun", "only for mbf replay --rrd, Python >= 3.11: pip install 'mbf-flex[rerun]'", optional=True)
     yield _package("av", "only for mbf replay --mp4: pip install 'mbf-flex[video]'", optional=True)
     yield _check("plugins", _plugins, "mbf plugins lists which and why")

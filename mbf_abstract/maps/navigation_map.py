@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
-from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.sensing import RangeScan
@@ -114,6 +114,13 @@ class NavigationMap(ABC):
         Obstacles on other storeys do not count.
         """
 
+    def heights_below(self, points: FloatArray) -> FloatArray | None:
+        """Return the height (n,) [m] of the first ground straight below each point (n, 3) [m], nan where there is none.
+
+        None for a map that knows no heights.
+        """
+        return None
+
     @property
     def robot_box(self) -> RobotBox:
         """The robot's outline for contacts with moving objects."""
@@ -190,11 +197,15 @@ class MapContext(PluginContext, Generic[M]):
         All maps of a server that has several, e.g. ``local`` and ``global``.
     transforms : TransformBuffer
         The frames of the maps; a map may be in another one than goals, paths and robot poses.
+    scans : mapping of str to RangeScan
+        The newest scan of each sensor, in the frame it came in; it changes with every scan. Empty on servers without
+        sensors.
     """
 
     navigation_map: M
     maps: Mapping[str, M] = field(default_factory=dict, kw_only=True)
     transforms: TransformBuffer = field(default_factory=TransformBuffer, kw_only=True)
+    scans: Mapping[str, RangeScan] = field(default_factory=dict, kw_only=True)
 
 
 class MapPlugin(Plugin):
@@ -205,6 +216,7 @@ class MapPlugin(Plugin):
         self.navigation_map: NavigationMap = context.navigation_map
         self.maps: Mapping[str, NavigationMap] = context.maps
         self.transforms = context.transforms
+        self.scans = context.scans
 
     def on_map(self, pose: Pose, navigation_map: NavigationMap | None = None) -> Pose:
         """Express a pose in the frame of a map, the plugin's own if none is given; raises TransformError."""

@@ -26,6 +26,8 @@ from mbf_abstract.maps.served_map import ServedMap
 
 MAX_REPORTED = 100
 """Most reports that are remembered; a faulty driver may send any number of source names."""
+MAX_SOURCES = 100
+"""Most sources whose newest scan is kept, for the same reason."""
 
 
 class ScanIntake:
@@ -36,12 +38,19 @@ class ScanIntake:
     runtime : Runtime
         Of the server.
     maps : mapping of name to ServedMap
+
+    Attributes
+    ----------
+    newest : dict of str to RangeScan
+        The newest scan of each source, in the frame it came in, also of sources that no layer listens to; for plugins
+        that look at scans themselves. Arrays are copies.
     """
 
     def __init__(self, runtime: Runtime, maps: Mapping[str, ServedMap[Any]]) -> None:
         self._runtime = runtime
         self._maps = maps
         self._reported: set[tuple[str, str]] = set()
+        self.newest: dict[str, RangeScan] = {}
 
     def take(self, scan: RangeScan) -> None:
         """Insert a scan into every map that listens to its source and can place it.
@@ -55,6 +64,8 @@ class ScanIntake:
         """
         if not math.isfinite(scan.stamp):
             raise ValueError(f"the stamp of a scan must be finite, got {scan.stamp} from source {scan.source!r}")
+        if scan.source in self.newest or len(self.newest) < MAX_SOURCES:
+            self.newest[scan.source] = scan.checked()
         listening = [name for name, served in self._maps.items() if served.map.listens_to(scan.source)]
         if not listening:
             self._report_unknown(scan.source)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from types import MappingProxyType
 from typing import Any
 
 from mbf_abstract.config.configuration import Config
@@ -59,6 +60,11 @@ class MapServer(AbstractNavigationServer):
         """The map-independent questions."""
         maps = list(self.served.values())
         return MapQueries(maps[0], maps[-1], self.runtime.robot, self.runtime.transforms)
+
+    @property
+    def scans(self) -> Mapping[str, RangeScan]:
+        """The newest scan of each sensor, see ``ScanIntake.newest``."""
+        return MappingProxyType(self._scans.newest)
 
     def take_scan(self, scan: RangeScan) -> None:
         """Hand a scan to every map with a layer that listens to its source, as ``ScanIntake.take``."""

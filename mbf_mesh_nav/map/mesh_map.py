@@ -17,7 +17,7 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
-from mbf_mesh_nav.arrays import IntArray
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
 from mbf_mesh_nav.map.places import MeshPlaces
@@ -313,6 +313,11 @@ class MeshMap(LayeredMap):
         snapshot = self.snapshot()
         lethal = np.asarray(snapshot.lethal | np.isposinf(snapshot.costs))
         return nearest_of(self.topology, place, pose, within, lethal)
+
+    def heights_below(self, points: FloatArray) -> FloatArray:
+        """Height (n,) [m] of the first surface straight below each point (n, 3) [m], nan where there is none."""
+        _, distances = self.locator.cast_rays(points, (0.0, 0.0, -1.0))
+        return np.where(np.isfinite(distances), points[:, 2] - distances, np.nan)
 
     def stale_reason(self, now: float) -> str:
         """Why the map is not current at ``now`` [s]: a layer that raised, or a silent sensor; empty if it is."""

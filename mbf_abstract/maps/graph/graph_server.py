@@ -49,7 +49,7 @@ class GraphMapServer(MapServer):
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add the map."""
         transforms = self.runtime.transforms
-        return MapContext(**vars(base), navigation_map=self.navigation_map, transforms=transforms)
+        return MapContext(**vars(base), navigation_map=self.navigation_map, transforms=transforms, scans=self.scans)
 
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
         """Height of the node at a place, if there is one."""

@@ -103,7 +103,8 @@ class TileServer(MapServer):
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add the map."""
-        return MapContext(**vars(base), navigation_map=self.tiled_map, transforms=self.runtime.transforms)
+        transforms = self.runtime.transforms
+        return MapContext(**vars(base), navigation_map=self.tiled_map, transforms=transforms, scans=self.scans)
 
     def _construct(self, spec: PluginSpec) -> LoadedPlugin[Any]:
         if issubclass(spec.plugin_class, MeshPlugin):

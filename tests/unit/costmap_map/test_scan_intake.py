@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -10,6 +11,7 @@ from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import Pose, quaternion_from_yaw
 from mbf_abstract.geometry.transform import Transform, TransformError
 from mbf_abstract.geometry.transform_buffer import ExtrapolationError, TransformBuffer
+from mbf_abstract.maps.scan_intake import MAX_SOURCES
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.testing.loopback import LoopbackRobot
@@ -156,3 +158,25 @@ def test_a_scan_in_another_frame_has_its_origin_and_ends_where_they_were(start, 
     assert placed.frame_id == "drift" and placed.stamp == stamp
     assert placed.ends[0] == pytest.approx(expected.apply([(2.05, 0.05, 0.1)])[0])
     assert placed.origin == pytest.approx(expected.apply([(0.05, 0.05, 0.1)])[0])
+
+
+def test_the_newest_scan_of_every_source_is_kept_as_a_copy_also_where_no_layer_listens(site):
+    server, transforms, _ = site
+    transforms.set(CONNECTED)
+    for stamp in (0.9, 1.0):
+        transforms.set(turned(0.0, stamp))
+    first, second, other = ahead(0.9), ahead(1.0), ahead(1.0, source="camera")
+    reused = RangeScan("lidar", "laser", first.origin, np.array(first.ends), first.hits, 1.0)
+    for scan in (first, reused, other):
+        server.take_scan(scan)
+    reused.ends[:] = 0.0  # a driver that uses its buffers again
+    assert server.scans.keys() == {"lidar", "camera"}
+    assert server.scans["lidar"].stamp == 1.0 and server.scans["lidar"].frame_id == "laser"
+    assert np.array_equal(server.scans["lidar"].ends, second.ends)
+
+
+def test_sources_without_end_do_not_fill_the_memory(site):
+    server, _, _ = site
+    for number in range(MAX_SOURCES + 5):
+        server.take_scan(ahead(1.0, frame="map", source=f"made up {number}"))
+    assert len(server.scans) == MAX_SOURCES

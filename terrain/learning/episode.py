@@ -1,0 +1,215 @@
+"""One drive of an environment: a session whose robot is driven from outside instead of by a controller.
+
+World, sensors, faults, map, planner and velocity gate are those of ``mbf run`` with the same scenario and seed; the
+verdict is that of ``terrain.recording.verdict``. Plans are made as often as ``planner_frequency`` says. Recoveries
+are not run, nor is anything slowed down before what moves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from enum import Enum
+from typing import cast
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
+from mbf_abstract.geometry.tilt import tilt_of
+from mbf_abstract.goals.goal_types import MoveBaseResult
+from mbf_abstract.outcomes import MoveBaseOutcome
+from mbf_abstract.server.map_server import MapServer
+from terrain.learning.observation import Observation, ObservationParameters, Observer
+from terrain.physics.incidents import IncidentKind
+from terrain.recording.verdict import Verdict, judge
+from terrain.scenarios.limits import broken_limits
+from terrain.scenarios.scenario import Scenario
+from terrain.session.arrival import Arrival, arrival_tolerance
+from terrain.session.session import Session, SessionOptions
+
+OWNER = "environment"  # of the lease of the velocity gate
+TIME_TOLERANCE = 1e-9  # s
+
+
+class Ending(Enum):
+    """How an episode has ended, or that it has not."""
+
+    NOT_YET = ""
+    ARRIVED = "arrived"
+    CONTACT = "contact"
+    TIPPED_OVER = "tipped_over"
+    LIMIT = "limit"
+    TIME = "time"
+
+
+class Episode:
+    """A session with the robot at its start, sensors and maps alive, and the first plan made.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With one robot.
+    options : SessionOptions
+        Backend, seed and settings.
+    observed : ObservationParameters
+    control_period : float
+        Length of a step [s].
+
+    Raises
+    ------
+    ConfigError
+        The configuration is wrong; all findings.
+    ValueError
+        A part of the observation cannot be had in this scenario on this map, or the velocity gate would stop the robot
+        before the end of a step.
+    """
+
+    def __init__(
+        self, scenario: Scenario, options: SessionOptions, observed: ObservationParameters, control_period: float
+    ) -> None:
+        self.session = Session(scenario, options)
+        self._control_period = control_period
+        try:
+            self._begin(observed)
+        except BaseException:
+            self.session.close()
+            raise
+
+    def _begin(self, observed: ObservationParameters) -> None:
+        session, server = self.session, cast(MapServer, self.session.navigator.server)
+        if observed.scan_sectors and not session.sensor_mounts:
+            raise ValueError(f"scan_sectors: expected 0 in {session.scenario.name!r}, which has no lidar")
+        runtime = self._runtime = server.runtime
+        if self._control_period > runtime.gate.command_timeout:
+            limit = f"at most the command_timeout of the configuration, {runtime.gate.command_timeout:g} s"
+            raise ValueError(f"control_period: expected {limit}, got {self._control_period:g} s")
+        driven_on = list(server.served.values())[-1].map
+        self._observer = Observer(observed, driven_on, runtime.transforms, server.scans)
+        self._makes_plans = observed.waypoints > 0
+        self._goals = session.goals
+        self._arrivals: list[Arrival] = []
+        self._is_at_last_goal = False
+        self._seen_track, self._max_tilt = 0, 0.0
+        session.run()
+        lease = runtime.gate.acquire(OWNER)
+        assert lease is not None, "nobody else drives in an episode"
+        self._lease = lease
+        self._plan_to_goal(is_new=True)
+        self._way_left = self._measured_way()
+
+    # ----------------------------------------------------------------------------------------------- driving
+    @property
+    def time(self) -> float:
+        """Simulated time [s] since the world was made."""
+        return self.session.simulation.time
+
+    @property
+    def true_pose(self) -> Pose:
+        """Ground truth of the robot."""
+        return self.session.loop.true_pose
+
+    def drive(self, command: Twist) -> float:
+        """Send a command and let a step's time pass; return by how much the way left has become shorter [m].
+
+        The way left is the rest of the plan and the distance from it; it also changes with the plan, so that the sum
+        over an episode with one goal is the first way less the last one. What the simulation raises is raised here.
+        """
+        session = self.session
+        self._lease.send(command)
+        session.clock.sleep(self._control_period)
+        if session.loop.failure is not None:
+            raise session.loop.failure
+        for pose in session.simulation.track[self._seen_track :]:
+            self._max_tilt = max(self._max_tilt, tilt_of(pose))
+        self._seen_track = len(session.simulation.track)
+        if self._replan_at <= session.clock.now() + TIME_TOLERANCE:
+            self._plan_to_goal(is_new=False)
+        before, self._way_left = self._way_left, self._measured_way()
+        gained = before - self._way_left
+        self._take_arrival()
+        return gained
+
+    def _measured_way(self) -> float:
+        """Length [m] of the plan that is left for the robot in truth, and its distance from the plan."""
+        self._way.update(self.true_pose.position)
+        return self._way.remaining + self._way.deviation
+
+    def observe(self) -> Observation:
+        """Return the present observation."""
+        robot = self._runtime.robot
+        return self._observer.observe(robot.pose(), robot.velocity())
+
+    def close(self) -> None:
+        """Stop the robot and free the world; idempotent."""
+        self.session.close()
+
+    def _plan_to_goal(self, is_new: bool) -> None:
+        """Plan; without a plan the last one to this goal stays, or else the straight line is one."""
+        goal, rate = self._goals[0], self._runtime.parameters.planner_frequency
+        again = self._makes_plans and rate > 0.0
+        self._replan_at = self.session.clock.now() + 1.0 / rate if again else math.inf
+        path = self._planned(goal) if self._makes_plans else None
+        if path is None and is_new:
+            path = Path.from_points([self.true_pose.position, goal.position], goal.orientation)
+        if path is not None:
+            self._observer.set_plan(path)
+            self._way = PathTracker(path)
+
+    def _planned(self, goal: Pose) -> Path | None:
+        """What the planner and, if the configuration names one, the refiner make of the way to a goal."""
+        navigator = self.session.navigator
+        path = navigator.get_path(goal).path
+        if path is None or not len(path):
+            return None
+        refiner = self._runtime.parameters.plan_refiner
+        refined = navigator.refine_path(path, refiner=refiner).refined_path if refiner else None
+        return path if refined is None else refined
+
+    def _take_arrival(self) -> None:
+        """Go on to the next goal once the robot is at one by its estimated pose, as navigation decides it."""
+        parameters, goal = self._runtime.parameters, self._goals[0]
+        pose = self._runtime.robot.pose()
+        distance, angle = pose.distance_to(goal), abs(normalize_angle(pose.yaw - goal.yaw))
+        if distance >= parameters.dist_tolerance or angle >= parameters.angle_tolerance:
+            return
+        result = MoveBaseResult(MoveBaseOutcome.SUCCESS, "", pose, distance, angle)
+        self._arrivals.append(Arrival.at(goal, self.true_pose, result))
+        if len(self._goals) > 1:
+            del self._goals[0]
+            self._plan_to_goal(is_new=True)
+            self._way_left = self._measured_way()
+        else:
+            self._is_at_last_goal = True
+
+    # ----------------------------------------------------------------------------------------------- judging
+    def ending(self, time_limit: float) -> Ending:
+        """Whether the judge ends the episode now; ``time_limit`` is in simulated seconds."""
+        counts = self.session.simulation.monitor.counts
+        if counts[IncidentKind.COLLISION_WHILE_MOVING]:
+            return Ending.CONTACT
+        if counts[IncidentKind.TIPPED_OVER]:
+            return Ending.TIPPED_OVER
+        if broken_limits(self.session.scenario.limits, self._metrics()):
+            return Ending.LIMIT
+        if self._is_at_last_goal:
+            return Ending.ARRIVED
+        return Ending.TIME if self.time >= time_limit else Ending.NOT_YET
+
+    def verdict(self, ending: Ending) -> Verdict:
+        """Return the judge's verdict on an episode that ends so."""
+        arrived = ending is Ending.ARRIVED
+        outcome = MoveBaseOutcome.SUCCESS if arrived else MoveBaseOutcome.FAILURE
+        return judge(MoveBaseResult(outcome, ending.value), self.session.scenario.limits, self._metrics())
+
+    def _metrics(self) -> Mapping[str, object]:
+        """What the judge looks at, as it stands in ``metrics.json`` of a run."""
+        simulation, scenario = self.session.simulation, self.session.scenario
+        counts = simulation.monitor.counts
+        return {
+            "arrivals": [arrival.to_json() for arrival in self._arrivals],
+            "arrival_tolerance": arrival_tolerance(scenario.limits, scenario.localization, self._runtime.parameters),
+            "incidents": sorted({incident.kind.value for incident in simulation.incidents}),
+            "collisions_while_moving": counts[IncidentKind.COLLISION_WHILE_MOVING],
+            "tip_overs": counts[IncidentKind.TIPPED_OVER],
+            "max_tilt_deg": math.degrees(self._max_tilt),
+            "path_length_m": simulation.monitor.distance,
+        }

@@ -1,0 +1,37 @@
+"""Which world an environment builds for a seed: always one scenario, or those of an evaluation of ``mbf bench``.
+
+The evaluations drive the seeds 0 and 1 of each level unless other ones are asked for: leave the first ones out of a
+training (``seeds`` of the environment), and a comparison is on worlds that the policy has never seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from terrain.experiments.evaluation import indoor, outdoor
+from terrain.scenarios.scenario import Scenario, load_scenario
+
+Worlds = Callable[[int], tuple[Scenario, int]]
+"""Scenario and seed of its run, for a seed of the environment."""
+
+
+def one_world(scenario: Scenario | str) -> Worlds:
+    """Return a scenario, the name of a shipped one or a file; a seed is the one of ``mbf run --seed``.
+
+    Raises
+    ------
+    ConfigError
+        There is no such scenario, or the file is wrong; all findings.
+    """
+    loaded = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    return lambda seed: (loaded, seed)
+
+
+def bench_indoor(levels: Sequence[int] = range(indoor.LEVELS)) -> Worlds:
+    """Return the rooms of ``mbf bench indoor``: the seed counts through the levels, then through the rooms' seeds."""
+    return lambda seed: (indoor.room(levels[seed % len(levels)], seed // len(levels)), seed // len(levels))
+
+
+def bench_outdoor(levels: Sequence[int] = range(outdoor.LEVELS)) -> Worlds:
+    """Return the generated terrains of ``mbf bench outdoor``, counted likewise."""
+    return lambda seed: (outdoor.generated(levels[seed % len(levels)]), seed // len(levels))
