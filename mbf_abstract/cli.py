@@ -25,7 +25,6 @@ def make_app() -> typer.Typer:
         name="mbf",
         help="Map-independent navigation for mobile robots, on 2D costmaps and 3D triangle meshes.",
         no_args_is_help=True,
-        add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode="markdown",  # "rich", the default, takes a unit such as [m] for markup and drops it
     )

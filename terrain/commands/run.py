@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from mbf_abstract.commands.completion import complete_backend, complete_controller, complete_planner
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from terrain.commands.command_line import command_line
 from terrain.commands.compare import compare
+from terrain.commands.completion import SCENARIO
 from terrain.commands.new_run import RUNS, new_run_folder
 from terrain.commands.rerun import rerun
 
@@ -35,15 +37,27 @@ def register(app: typer.Typer) -> None:
 
 def run(
     context: typer.Context,
-    scenario: str = typer.Argument(..., help="Name of a shipped scenario (see mbf scenarios), or a YAML file."),
-    backend: str = typer.Option("", "--backend", help="Map backend: mesh or costmap; the scenario's own if not given."),
+    scenario: str = SCENARIO,
+    backend: str = typer.Option(
+        "",
+        "--backend",
+        help="Map backend: mesh or costmap; the scenario's own if not given.",
+        autocompletion=complete_backend,
+    ),
     seed: int = typer.Option(
         -1, "--seed", min=-1, help="Seed of sensors and plugins; the scenario's own if not given."
     ),
     out: Path | None = typer.Option(None, "--out", help="Folder for the results; runs/<time> if not given."),
     map_file: Path | None = typer.Option(None, "--map", help="Drive in the building of this map_server yaml instead."),
-    planner: str = typer.Option("", "--planner", help="Planner to use: a name in the configuration, or a type."),
-    controller: str = typer.Option("", "--controller", help="Controller to use, likewise."),
+    planner: str = typer.Option(
+        "",
+        "--planner",
+        help="Planner to use: a name in the configuration, or a type.",
+        autocompletion=complete_planner,
+    ),
+    controller: str = typer.Option(
+        "", "--controller", help="Controller to use, likewise.", autocompletion=complete_controller
+    ),
     settings: list[str] = typer.Option(
         [], "--set", help="KEY=VALUE: world.KEY of the scenario, or a dotted path of the configuration; repeatable."
     ),
@@ -198,7 +212,8 @@ def scenarios(
 ) -> None:
     """List the scenarios that come with the package, and what each of them proves."""
     with readable_errors():
-        from terrain.scenarios.scenario import copy_scenario, load_scenario, shipped_scenarios
+        from terrain.scenarios.scenario import copy_scenario, load_scenario
+        from terrain.scenarios.shipped import shipped_scenarios
 
         if copy:
             for file in copy_scenario(copy, to):

@@ -25,12 +25,11 @@ from terrain.scenarios.obstacles import Forest, Obstacle
 from terrain.scenarios.perturbation import Perturbation
 from terrain.scenarios.places import Place, PlanarPose
 from terrain.scenarios.robots import OwnRobot, Sensor
+from terrain.scenarios.shipped import LIBRARY, shipped_scenarios
 from terrain.scenarios.world_types import LevelsWorld, MapWorld, TerrainWorld, World
 from terrain.urdf_robots.robot_choice import RobotChoice, find_wrong_robot, is_legged, located
 
-__all__ = ["MapWorld", "Obstacle", "PlanarPose", "Scenario", "Sensor", "load_scenario", "shipped_scenarios"]
-
-SHIPPED = Path(__file__).parent / "library"
+__all__ = ["MapWorld", "Obstacle", "PlanarPose", "Scenario", "Sensor", "load_scenario"]
 
 
 class Scenario(ParameterModel):
@@ -87,7 +86,7 @@ def scenario_file(name_or_file: str | os.PathLike[str]) -> Path:
     """Return the file of a shipped scenario, or the file that is named; raises ConfigError for an unknown name."""
     path = Path(name_or_file)
     if path.suffix not in (".yaml", ".yml"):
-        path = SHIPPED / f"{name_or_file}.yaml"
+        path = LIBRARY / f"{name_or_file}.yaml"
         if not path.is_file():
             known = ", ".join(sorted(shipped_scenarios()))
             raise ConfigError(
@@ -220,7 +219,7 @@ def copy_scenario(name: str, folder: Path) -> list[Path]:
         raise ConfigError([Finding("scenarios", 1, name, f"one of {', '.join(known)}", repr(name))])
     data = load_yaml(known[name]).data
     files = [file for block in (data, *data.get("robots", ())) for file in block.get("navigation", {}).values()]
-    copies = {folder / known[name].name: known[name]} | {folder / file: SHIPPED / file for file in files}
+    copies = {folder / known[name].name: known[name]} | {folder / file: LIBRARY / file for file in files}
     there = [Finding(str(copy), 1, "", "no file, because a copy comes here", "one") for copy in copies if copy.exists()]
     if there:
         raise ConfigError(there)
@@ -228,8 +227,3 @@ def copy_scenario(name: str, folder: Path) -> list[Path]:
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_bytes(source.read_bytes())
     return list(copies)
-
-
-def shipped_scenarios() -> dict[str, Path]:
-    """Names and files of the scenarios that come with the package."""
-    return {file.stem: file for file in sorted(SHIPPED.glob("*.yaml"))}

@@ -9,6 +9,7 @@ import typer
 
 from mbf_abstract.commands.reporting import readable_errors
 from terrain.commands.command_line import command_line
+from terrain.commands.completion import SCENARIO
 
 
 def register(app: typer.Typer) -> None:
@@ -18,7 +19,7 @@ def register(app: typer.Typer) -> None:
 
 def sweep(
     context: typer.Context,
-    scenario: str = typer.Argument(..., help="Name of a shipped scenario (see mbf scenarios), or a YAML file."),
+    scenario: str = SCENARIO,
     seeds: str = typer.Option("0:10", "--seeds", help="First and one past the last seed, 0:20, or a list, 1,5,9."),
     settings: list[str] = typer.Option(
         [], "--set", help="KEY=VALUE,VALUE: planner, controller, backend, world.KEY, or a path of the configuration."

@@ -18,8 +18,9 @@ from terrain.scenarios.environment import build_environment, with_noise
 from terrain.scenarios.noise import LocalizationNoise, MapNoise
 from terrain.scenarios.perturbation import Disturbance, Perturbation, draw_disturbance
 from terrain.scenarios.places import PlanarPose
-from terrain.scenarios.scenario import load_scenario, shipped_scenarios
+from terrain.scenarios.scenario import load_scenario
 from terrain.scenarios.sensors import make_localization
+from terrain.scenarios.shipped import shipped_scenarios
 from terrain.sensors.proprioception import Localization
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.worlds.generate import flat_terrain

@@ -10,7 +10,8 @@ from mbf_abstract.cli import make_app
 from mbf_abstract.commands.check import check as check_command
 from mbf_abstract.config.yaml_source import load_yaml
 from terrain.commands.check import check
-from terrain.scenarios.scenario import SHIPPED, shipped_scenarios
+from terrain.scenarios.scenario import SHIPPED
+from terrain.scenarios.shipped import shipped_scenarios
 from terrain.session.scenario_check import check_scenario
 
 SCENARIO = {
