@@ -23,9 +23,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from terrain.scenarios.library import shipped_scenarios
 from terrain.scenarios.perturbation import Perturbation
 from terrain.scenarios.scenario import Scenario, load_scenario
-from terrain.scenarios.shipped import shipped_scenarios
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.sweeps.command import parse_seeds
 from terrain.sweeps.log import SweepLog

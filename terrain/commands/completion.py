@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from mbf_abstract.commands.completion import starting_with
-from terrain.scenarios.shipped import shipped_scenarios
+from terrain.scenarios.library import shipped_scenarios
 
 
 def complete_scenario(incomplete: str) -> list[str]:

@@ -212,8 +212,8 @@ def scenarios(
 ) -> None:
     """List the scenarios that come with the package, and what each of them proves."""
     with readable_errors():
+        from terrain.scenarios.library import shipped_scenarios
         from terrain.scenarios.scenario import copy_scenario, load_scenario
-        from terrain.scenarios.shipped import shipped_scenarios
 
         if copy:
             for file in copy_scenario(copy, to):

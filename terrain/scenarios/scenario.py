@@ -19,13 +19,13 @@ from mbf_abstract.config.yaml_source import YamlDocument, load_yaml
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.scenarios.actors import Actor
 from terrain.scenarios.faults import IMU, LOCALIZATION, ODOMETRY, Fault, SensorFault
+from terrain.scenarios.library import LIBRARY, shipped_scenarios
 from terrain.scenarios.limits import Limits
 from terrain.scenarios.noise import LocalizationNoise, MapNoise
 from terrain.scenarios.obstacles import Forest, Obstacle
 from terrain.scenarios.perturbation import Perturbation
 from terrain.scenarios.places import Place, PlanarPose
 from terrain.scenarios.robots import OwnRobot, Sensor
-from terrain.scenarios.shipped import LIBRARY, shipped_scenarios
 from terrain.scenarios.world_types import LevelsWorld, MapWorld, TerrainWorld, World
 from terrain.urdf_robots.robot_choice import RobotChoice, find_wrong_robot, is_legged, located
 

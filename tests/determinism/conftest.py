@@ -19,8 +19,8 @@ try:
 except ImportError:  # numpy before 2
     from numpy.core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
+from terrain.scenarios.library import shipped_scenarios
 from terrain.scenarios.scenario import load_scenario
-from terrain.scenarios.shipped import shipped_scenarios
 
 DRIVES = Path(__file__).with_name("drives.py")
 EVERYTHING = os.environ.get("MBF_SAME_BYTES") == "all"

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from terrain.scenarios.scenario import SHIPPED, load_scenario, robot_scenarios
+from terrain.scenarios.library import LIBRARY
+from terrain.scenarios.scenario import load_scenario, robot_scenarios
 from terrain.scenarios.settings import apply_world_settings
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.sweeps.command import parse_seeds, parse_settings
@@ -23,7 +24,7 @@ def blocks_of_the_page():
 def example(tmp_path):
     """The scenario of the page, as a reader would put it into a file."""
     text, _ = blocks_of_the_page()
-    (tmp_path / "config").symlink_to(SHIPPED / "config")
+    (tmp_path / "config").symlink_to(LIBRARY / "config")
     (tmp_path / "example.yaml").write_text(text)
     return load_scenario(tmp_path / "example.yaml")
 
@@ -40,8 +41,8 @@ def test_the_scenario_of_the_page_is_read_without_a_finding(example):
 
 def test_the_robots_of_the_page_take_the_place_of_one_robot_in_a_shipped_scenario(tmp_path):
     _, robots = blocks_of_the_page()
-    kept = yaml.safe_load((SHIPPED / "two_couriers.yaml").read_text())
-    (tmp_path / "config").symlink_to(SHIPPED / "config")
+    kept = yaml.safe_load((LIBRARY / "two_couriers.yaml").read_text())
+    (tmp_path / "config").symlink_to(LIBRARY / "config")
     (tmp_path / "robots.yaml").write_text(yaml.safe_dump(kept | yaml.safe_load(robots)))
     anna, ben = robot_scenarios(load_scenario(tmp_path / "robots.yaml")).values()
     assert (anna.robot, anna.start, ben.robot) == ("turtlebot", "reception", "husky")

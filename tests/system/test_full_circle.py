@@ -7,9 +7,10 @@ from mbf_mesh_nav.building.map_build import build_map
 from mbf_mesh_nav.building.surface import SurfaceParameters
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from terrain.scenarios.environment import FOREST_STREAM, WORLD_STREAM
+from terrain.scenarios.library import LIBRARY
 from terrain.scenarios.obstacles import Forest
 from terrain.scenarios.places import coordinates
-from terrain.scenarios.scenario import SHIPPED, PlanarPose, load_scenario
+from terrain.scenarios.scenario import PlanarPose, load_scenario
 from terrain.session.runner import RunOptions, run_scenario
 
 POSTS = Forest(x_range=(4.0, 14.0), y_range=(2.0, 10.0), count=14, gap=2.0)
@@ -22,7 +23,7 @@ def scenario():
     forest = load_scenario("post_forest")
     world = forest.world.model_copy(update={"size": (18.0, 12.0)})
     changes = {"world": world, "forests": (POSTS,), "sensors": (), "physics": "kinematic", "time_limit": 60.0}
-    changes["navigation"] = {"mesh": SHIPPED / "config" / "outdoor_mesh.yaml"}
+    changes["navigation"] = {"mesh": LIBRARY / "config" / "outdoor_mesh.yaml"}
     places = {"start": PlanarPose(x=2.0, y=6.0), "goals": (PlanarPose(x=16.0, y=6.0),)}
     return forest.model_copy(update={**changes, **places})
 

@@ -6,7 +6,7 @@ import pytest
 from mbf_abstract.geometry import Path, quaternion_from_yaw
 from mbf_abstract.plugins import PlanResult
 from mbf_mesh_nav.plugins import MeshPlanner
-from terrain.scenarios.shipped import shipped_scenarios
+from terrain.scenarios.library import shipped_scenarios
 from terrain.session.runner import RunOptions, run_scenario
 
 SETTLING_CALLS = 20

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from terrain.scenarios.library import shipped_scenarios
 from terrain.scenarios.scenario import load_scenario
-from terrain.scenarios.shipped import shipped_scenarios
 from terrain.session.runner import RunOptions, run_scenario
 
 RUN_ELSEWHERE = {"outdoor", "indoor", "two_couriers"}  # test_run_scenarios.py, test_run_several_robots.py

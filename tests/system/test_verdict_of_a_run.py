@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from mbf_abstract.cli import make_app
 from mbf_abstract.events import EventKind, read_events
 from terrain.recording.run_folder import read_run
-from terrain.scenarios.scenario import SHIPPED
+from terrain.scenarios.library import LIBRARY
 from terrain.sweeps.log import SweepLog
 from terrain.viewer.pictures.colours import WARNING
 
@@ -23,8 +23,8 @@ def mbf(*arguments):
 @pytest.fixture
 def rude(tmp_path):
     """The crowded corridor, with people who do not look where they walk; with seed 1 the robot arrives nevertheless."""
-    text = (SHIPPED / "crowded_corridor.yaml").read_text()
-    text = re.sub(r"(type: (walker|crowd))", r"\1, blind: true", text).replace("config/", f"{SHIPPED}/config/")
+    text = (LIBRARY / "crowded_corridor.yaml").read_text()
+    text = re.sub(r"(type: (walker|crowd))", r"\1, blind: true", text).replace("config/", f"{LIBRARY}/config/")
     (tmp_path / "rude.yaml").write_text(text)
     return tmp_path / "rude.yaml"
 

@@ -30,4 +30,6 @@ def test_what_begins_as_typed_is_offered(typed, words):
 
 def test_a_file_of_ones_own_is_left_to_the_shell():
     assert offered("mbf run my_world") == []
-    assert "complete -o default" in CliRunner().invoke(make_app(), ["--show-completion", "bash"], prog_name="mbf").stdout
+    assert (
+        "complete -o default" in CliRunner().invoke(make_app(), ["--show-completion", "bash"], prog_name="mbf").stdout
+    )

@@ -7,9 +7,9 @@ from typer.testing import CliRunner
 
 from mbf_abstract.config.findings import ConfigError
 from terrain.commands.run import register, settings_of
+from terrain.scenarios.library import shipped_scenarios
 from terrain.scenarios.scenario import copy_scenario, load_scenario
 from terrain.scenarios.settings import apply_settings
-from terrain.scenarios.shipped import shipped_scenarios
 
 
 def mbf(*arguments):

@@ -21,8 +21,8 @@ from terrain.provenance.provenance import (
     write_provenance,
     write_scenario,
 )
+from terrain.scenarios.library import shipped_scenarios
 from terrain.scenarios.scenario import load_scenario, robot_scenarios
-from terrain.scenarios.shipped import shipped_scenarios
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())

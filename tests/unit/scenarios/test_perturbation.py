@@ -15,12 +15,12 @@ from terrain.physics.robot_models import HUSKY, TURTLEBOT
 from terrain.physics.robots import WheeledRobot
 from terrain.physics.world import BulletWorld
 from terrain.scenarios.environment import build_environment, with_noise
+from terrain.scenarios.library import shipped_scenarios
 from terrain.scenarios.noise import LocalizationNoise, MapNoise
 from terrain.scenarios.perturbation import Disturbance, Perturbation, draw_disturbance
 from terrain.scenarios.places import PlanarPose
 from terrain.scenarios.scenario import load_scenario
 from terrain.scenarios.sensors import make_localization
-from terrain.scenarios.shipped import shipped_scenarios
 from terrain.sensors.proprioception import Localization
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.worlds.generate import flat_terrain

@@ -10,8 +10,7 @@ from mbf_abstract.cli import make_app
 from mbf_abstract.commands.check import check as check_command
 from mbf_abstract.config.yaml_source import load_yaml
 from terrain.commands.check import check
-from terrain.scenarios.scenario import SHIPPED
-from terrain.scenarios.shipped import shipped_scenarios
+from terrain.scenarios.library import LIBRARY, shipped_scenarios
 from terrain.session.scenario_check import check_scenario
 
 SCENARIO = {
@@ -137,7 +136,7 @@ def test_a_world_that_cannot_be_built_is_a_finding_at_its_key(tmp_path):
 
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_shipped_scenarios_have_no_mistakes(name):
-    assert "backends" in check(SHIPPED / f"{name}.yaml", load=False).summary
+    assert "backends" in check(LIBRARY / f"{name}.yaml", load=False).summary
 
 
 def test_a_shipped_scenario_is_checked_by_its_name():

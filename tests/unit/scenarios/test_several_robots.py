@@ -24,9 +24,9 @@ from terrain.physics.simulation import Simulation
 from terrain.physics.world import BulletWorld
 from terrain.recording.fleet_metrics import contacts_between, judge_together
 from terrain.recording.verdict import Level, Verdict
+from terrain.scenarios.library import shipped_scenarios
 from terrain.scenarios.on_map import on_map
 from terrain.scenarios.scenario import load_scenario, robot_scenarios
-from terrain.scenarios.shipped import shipped_scenarios
 from terrain.sensors.rays import FellowRays
 from terrain.session.fleet import FleetSession, seed_of
 from terrain.session.fleet_run import run_fleet

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-LIBRARY = Path(__file__).parent / "library"
+LIBRARY = Path(__file__).parent
 """Folder of the scenarios and of the configurations that they name."""
 
 
