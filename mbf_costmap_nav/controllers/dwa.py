@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Twist
+from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
@@ -49,6 +50,7 @@ class DwaParameters(PluginParameters):
     critics: CriticParameters = parameter(
         CriticParameters(path_align=6.0, path_follow=8.0, obstacle=3.0), "Weights of the trajectory critics."
     )
+    moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
 
 
 class DwaController(PathFollower):
@@ -78,6 +80,8 @@ class DwaController(PathFollower):
         velocities = self._ramps(cycle, candidates, steps)
         rollouts = roll_out(cycle, velocities, p.sim_step, p.max_vel_x * p.sim_time)
         costs = score(p.critics, rollouts)
+        around = MovingAround.on(self.navigation_map, cycle.request.pose, self.clock.now(), p.moving_objects)
+        costs += around.meet(rollouts.poses, p.sim_step).costs
         checked_steps = round(p.footprint_check_time / cycle.limit_factor / p.sim_step)
         for sample in np.argsort(costs, kind="stable").tolist():
             if costs[sample] >= COLLISION:

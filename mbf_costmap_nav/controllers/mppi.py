@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Twist
+from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
@@ -84,6 +85,7 @@ class MppiParameters(PluginParameters):
     gamma: float = parameter(0.015, "Cost of leaving the nominal sequence.", ge=0.0, le=10.0)
     footprint_check_time: float = parameter(1.0, "How far the full footprint is checked.", unit="s", ge=0.0, le=10.0)
     critics: CriticParameters = parameter(CriticParameters(), "Weights of the trajectory critics.")
+    moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
 
 
 class MppiController(PathFollower):
@@ -100,7 +102,7 @@ class MppiController(PathFollower):
         self._velocities = np.empty(shape[1:], dtype=np.float32)
         self._poses = np.empty(shape[1:], dtype=np.float32)
         self._smoothing = smoothing_matrix(p.time_steps)
-        self._idle_cycles = 0
+        self._idle_cycles, self._meets_somebody = 0, False
         self._nominal: Float32Array = np.zeros((3, p.time_steps), dtype=np.float32)
         self.parameters_changed()
 
@@ -162,8 +164,11 @@ class MppiController(PathFollower):
         return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
 
     def _is_stuck(self, controls: Float32Array) -> bool:
-        """Whether a car that drives ``controls`` has made no progress for a while; it cannot turn on the spot."""
-        idle = self._radius > 0.0 and abs(controls[0, 0]) < STANDSTILL
+        """Whether a car that drives ``controls`` has made no progress for a while; it cannot turn on the spot.
+
+        One that lets somebody by is not stuck.
+        """
+        idle = self._radius > 0.0 and abs(controls[0, 0]) < STANDSTILL and not self._meets_somebody
         self._idle_cycles = self._idle_cycles + 1 if idle else 0
         return self._idle_cycles > IDLE_CYCLES
 
@@ -184,12 +189,19 @@ class MppiController(PathFollower):
         costs = score(p.critics, rollouts)
         if rollouts.collided.all():
             return None
+        around = MovingAround.on(self.navigation_map, cycle.request.pose, self.clock.now(), p.moving_objects)
+        met = around.meet(rollouts.poses, p.model_dt)
+        self._meets_somebody = bool(met.touches.any())
+        costs += met.costs
         controls = blend(velocities, costs + self._control_cost(velocities), p.temperature, self._smoothing)[:, :, None]
         self._clip(cycle, controls)
         checked_steps = max(1, round(p.footprint_check_time / cycle.limit_factor / p.model_dt))
         trajectory = np.empty_like(controls)
         integrate(controls, cycle.request.pose.yaw, p.model_dt, trajectory)
-        if is_free(cycle, trajectory[:, :checked_steps, 0]):
+        # The mean of passing in front of somebody and passing behind them may lead into them.
+        best_touches = bool(met.touches[int(np.argmin(costs))])
+        is_spoiled = not best_touches and bool(around.meet(trajectory, p.model_dt).touches[0])
+        if not is_spoiled and is_free(cycle, trajectory[:, :checked_steps, 0]):
             return np.asarray(controls[:, :, 0])
         for sample in np.argsort(costs, kind="stable")[:FALLBACK_SAMPLES].tolist():
             if costs[sample] < COLLISION and is_free(cycle, rollouts.poses[:, :checked_steps, sample]):

@@ -22,6 +22,7 @@ import numpy as np
 from mbf_abstract.execution.path_tracker import reverse_segments
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import exp, norm, tan
+from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
@@ -87,6 +88,7 @@ class MPPIParameters(PluginParameters):
     max_surface_distance: float = parameter(
         1.0, "Farther from the surface than this the robot is out of the map.", unit="m", gt=0.0
     )
+    moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
 
 
 class MPPIController(MeshController):
@@ -206,17 +208,21 @@ class MPPIController(MeshController):
         end = self._tracker.point_at(self._tracker.next_cusp)
         to_end = float(norm(end - spot.point))
         controls = self._sample(max_speed, max(self._tracker.to_cusp, to_end))
-        scores, collided = self._score(controls, spot, pose)
+        around = MovingAround.on(self.mesh_map, pose, self.clock.now(), self.parameters.moving_objects)
+        scores, collided, touches = self._score(controls, spot, pose, around)
         scores = np.where(collided, scores + _COLLISION_SCORE, scores)
         weights = exp(-(scores - scores.min()) / self.parameters.temperature)
         blended = np.asarray(((weights / weights.sum())[:, None, None] * controls).sum(axis=0))
-        # The mean of two free motions, left and right of an obstacle, may hit it.
-        if self._score(blended[None], spot, pose)[1][0]:
-            blended = np.asarray(controls[int(np.argmin(scores))])
+        # The mean of two free motions, left and right of an obstacle or of somebody, may hit it.
+        best = int(np.argmin(scores))
+        _, hits, meets = self._score(blended[None], spot, pose, around)
+        if hits[0] or (meets[0] and not touches[best]):
+            blended = np.asarray(controls[best])
         # Where most motions collide and the best one hardly moves, standing there would last for ever. So it would
-        # where none leads nearer, as for a car that has passed its goal; a cycle or two of it are chance.
+        # where none leads nearer, as for a car that has passed its goal; a cycle or two of it are chance. A robot that
+        # lets somebody by only waits.
         travel, turn = np.abs(blended.sum(axis=0)) * self.parameters.model_dt
-        stands = travel < _STANDSTILL and turn < _STANDSTILL
+        stands = travel < _STANDSTILL and turn < _STANDSTILL and not touches.any()
         has_far_to_go = self._distance_to_goal(pose) > _STANDSTILL + self.parameters.goal_distance
         self._idle_cycles = self._idle_cycles + 1 if stands and has_far_to_go else 0
         stuck = stands and (collided.mean() > 0.5 or self._idle_cycles > _IDLE_CYCLES)
@@ -251,8 +257,10 @@ class MPPIController(MeshController):
         np.clip(controls[..., 1], -turn_limit, turn_limit, out=controls[..., 1])
         return np.asarray(controls)
 
-    def _score(self, controls: FloatArray, spot: SurfacePoint, pose: Pose) -> tuple[FloatArray, BoolArray]:
-        """Scores (n,) and collisions (n,) of motions on the map of now."""
+    def _score(
+        self, controls: FloatArray, spot: SurfacePoint, pose: Pose, around: MovingAround
+    ) -> tuple[FloatArray, BoolArray, BoolArray]:
+        """Scores (n,), collisions (n,) on the map of now, and contacts (n,) with what moves, of motions."""
         p, mesh_map = self.parameters, self.mesh_map
         snapshot = mesh_map.snapshot()
         pieces = self._pieces_of_a_step()
@@ -278,7 +286,8 @@ class MPPIController(MeshController):
             p.goal_weight,
             p.heading_weight,
         )
-        return score_rollouts(
+        poses = np.empty((3, motions.shape[1] if around.anybody else 0, len(motions)), dtype=np.float32)
+        scores, collided = score_rollouts(
             mesh_map.vertices,
             mesh_map.faces,
             mesh_map.face_neighbours,
@@ -295,7 +304,10 @@ class MPPIController(MeshController):
             np.array(weights),
             (p.roll_limit, p.pitch_limit),
             -1.0 if backward else 1.0,
+            poses,
         )
+        costs, touches = around.meet(poses, p.model_dt / pieces)
+        return scores + costs, collided, touches
 
     def _run_out(self, end: float) -> FloatArray:
         """Points (3, 3) straight on beyond ``end`` [m] of the path: beyond a cusp, or beyond the goal as it looks."""

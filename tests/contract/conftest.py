@@ -223,13 +223,13 @@ occupancy_octree: {resolution: 0.2, width: 12.0, height: 8.0, robot_radius: 0.3,
 )
 
 
-def costmap_server(rig, **parameters):
-    return rig.server(COSTMAP, parameters)
+def costmap_server(rig, controller="regulated_pure_pursuit", **parameters):
+    return rig.server(COSTMAP.replace("regulated_pure_pursuit", controller), parameters)
 
 
-def mesh_server(rig, **parameters):
+def mesh_server(rig, controller="path_follower", **parameters):
     trimesh.Trimesh(*heightfield_mesh(np.zeros((81, 121)), 0.1, 0.1), process=False).export(rig.folder / "floor.ply")
-    return rig.server(MESH, parameters)
+    return rig.server(MESH.replace("path_follower", controller), parameters)
 
 
 def elevation_grid_server(rig, **parameters):

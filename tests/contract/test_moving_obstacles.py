@@ -2,6 +2,7 @@
 
 import math
 import re
+from functools import partial
 
 import pytest
 
@@ -60,12 +61,34 @@ def drive(made, walker_from, velocity, **changes):
     return walker, result
 
 
+SAMPLING = {
+    ("costmap", "dwa"): ((4.4, 7.0), (0.0, -0.6)),
+    ("costmap", "mppi"): ((4.4, 7.0), (0.0, -0.6)),
+    ("mesh", "mppi"): ((4.0, 7.0), (0.0, -1.2)),
+}
 CROSSINGS = {"costmap": ((4.4, 7.3), (0.0, -0.6)), "mesh": ((4.0, 7.5), (0.0, -1.2))}
 
 
 def test_the_robot_touches_nobody_who_crosses_its_path(make_map_server):
     with site(make_map_server, **PARAMETERS) as made:
         walker, result = drive(made, *CROSSINGS[made.server.backend])
+        assert result.success, result.message
+        assert walker.touched_by == ""
+
+
+@pytest.mark.parametrize(("backend", "controller"), SAMPLING)
+def test_a_sampling_controller_lets_those_who_cross_go_by(backends, backend, controller):
+    with site(partial(backends[backend], controller=controller), **PARAMETERS) as made:
+        walker, result = drive(made, *SAMPLING[backend, controller])
+        assert result.success, result.message
+        assert walker.touched_by != "robot"
+
+
+@pytest.mark.parametrize(("backend", "controller"), SAMPLING)
+def test_a_sampling_controller_avoids_them_without_the_guard_too(backends, backend, controller):
+    """Without looking at where people will be, all three drive into this one, as the guard is off."""
+    with site(partial(backends[backend], controller=controller), **PARAMETERS) as made:
+        walker, result = drive(made, *SAMPLING[backend, controller], stop_before_contact=False)
         assert result.success, result.message
         assert walker.touched_by == ""
 

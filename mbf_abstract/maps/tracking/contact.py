@@ -9,7 +9,7 @@ margin, or touches it, the robot stands.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +69,11 @@ class RobotBox(NamedTuple):
         return np.asarray(np.hypot(beyond_x, beyond_y) - self.radius - radii)
 
 
+def moving_on_storey(objects: Iterable[TrackedObject], z: float) -> list[TrackedObject]:
+    """Those of the objects that move, on the storey of a robot at height ``z`` [m]."""
+    return [known for known in objects if known.motion is Motion.MOVING and abs(known.z - z) < SAME_STOREY]
+
+
 def safe_share(
     box: RobotBox,
     pose: Pose,
@@ -99,7 +104,7 @@ def safe_share(
     touched : TrackedObject or None
         What the robot would touch first with the whole command; None where the share is 1.
     """
-    near = [known for known in objects if known.motion is Motion.MOVING and abs(known.z - pose.z) < SAME_STOREY]
+    near = moving_on_storey(objects, pose.z)
     if not near or command.is_stopped(1e-9, 1e-9):
         return 1.0, None
     touched = None

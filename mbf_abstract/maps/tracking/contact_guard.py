@@ -1,7 +1,8 @@
 """Stops a robot in time before what moves, whatever its controller: slower along the same arc, or not at all.
 
 When to use: by the server of a map, after each answer of a controller; on maps whose layers track objects. When not: to
-drive around, which planners and sampling controllers do by the costs of predicted places.
+drive around, which planners do by the costs of predicted places, and sampling controllers by looking ahead in time
+(``avoidance.py``).
 
 A robot that waits follows a command of zero, so its controller has not failed. After ``max_wait`` the path counts as
 blocked, and the executive decides.

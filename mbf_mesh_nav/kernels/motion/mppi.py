@@ -40,6 +40,7 @@ def score_rollouts(
     weights: FloatArray,
     tilt_limits: tuple[float, float],
     facing: float,
+    poses: Float32Array,
 ) -> tuple[FloatArray, BoolArray]:
     """Score every sequence of ``controls``.
 
@@ -64,6 +65,9 @@ def score_rollouts(
         Roll and pitch [rad] that cost 1 each.
     facing : float
         1 where the robot looks along the path, -1 where it drives it backward.
+    poses : (3, t, n) float32
+        Filled with x, y [m] relative to the start and yaw [rad], seen from above, after each step, a rollout that
+        collides staying where it does. Without steps, (3, 0, n), nothing is filled.
 
     Returns
     -------
@@ -92,7 +96,9 @@ def score_rollouts(
             comes_to = rank_at(vertices, faces, ranks, face, point)
             if walked < distance - 1e-9 or not may_enter(stands_on, comes_to):
                 collided[sequence] = True
+                _note(poses, sequence, Count(step), Count(step_count), difference(point, start), direction)
                 break
+            _note(poses, sequence, Count(step), Count(step + 1), difference(point, start), direction)
             stands_on = comes_to
             # 3. The path point nearest to here is at or after the one of the step before.
             gap = _squared_distance(path_points, nearest, point)
@@ -122,3 +128,11 @@ def score_rollouts(
 def _squared_distance(points: FloatArray, index: int, point: Vector) -> float:
     offset = difference(row(points, index), point)
     return dot(offset, offset)
+
+
+@inner_kernel
+def _note(poses: Float32Array, sequence: int, begin: int, end: int, offset: Vector, direction: Vector) -> None:
+    """Fill the steps from ``begin`` to ``end`` of a sequence with a pose, as far as there is room for them."""
+    for step in range(begin, min(end, poses.shape[1])):
+        poses[0, step, sequence], poses[1, step, sequence] = offset[0], offset[1]
+        poses[2, step, sequence] = math.atan2(direction[1], direction[0])

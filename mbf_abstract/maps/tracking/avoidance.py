@@ -1,0 +1,108 @@
+"""How a sampling controller prefers motions that meet nobody: going around, letting by, slowing down early.
+
+When to use: in every controller that samples motions, on both maps, beside its other terms. When not: as the only
+protection: a cost can be outweighed, and objects change their velocities. ``contact.py`` stops the robot in time.
+
+A motion is charged for what it makes worse than staying where the robot is. So a robot that stands is never at fault,
+whoever comes, and one that gets out of the way is not either.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.navigation_map import NavigationMap
+from mbf_abstract.maps.tracking.contact import moving_on_storey
+from mbf_abstract.maps.tracking.kernels.meeting import OBJECT_COLUMNS, meet
+from mbf_abstract.parameters import ParameterModel, parameter
+
+Float32Array = NDArray[np.float32]
+
+LOOK = 0.1
+"""Time [s] between two looks at robot and objects, or one step of the motions if that is longer."""
+
+
+class AvoidanceParameters(ParameterModel):
+    """How sampled motions keep away from where moving objects will be."""
+
+    weight: float = parameter(
+        20.0, "Cost of touching a moving object at once; falls to 0 at the horizon. 0 switches it off.", ge=0.0, le=1e4
+    )
+    horizon: float = parameter(2.5, "What would be met later costs nothing.", unit="s", gt=0.0, le=20.0)
+    margin: float = parameter(
+        0.3, "From here on a motion costs something, the more the nearer to contact.", unit="m", gt=0.0, le=5.0
+    )
+
+
+class Encounters(NamedTuple):
+    """What motions (n,) cost, float32, and whether each leads into somebody who would not touch a robot that stays."""
+
+    costs: Float32Array
+    touches: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class MovingAround:
+    """The objects that move around the robot in one control cycle.
+
+    Attributes
+    ----------
+    objects : (k, 5) float32
+        Place [m] relative to the robot, velocity [m/s] and radius [m] of each, along the axes of the map.
+    yaw : float
+        Of the robot [rad].
+    box : (5,) float32
+        Its outline, a ``RobotBox``.
+    limits : AvoidanceParameters
+    """
+
+    objects: Float32Array
+    yaw: float
+    box: Float32Array
+    limits: AvoidanceParameters
+
+    @classmethod
+    def on(cls, navigation_map: NavigationMap, pose: Pose, now: float, limits: AvoidanceParameters) -> MovingAround:
+        """What moves on the map at ``now`` [s]; nothing where the weight is 0.
+
+        Parameters
+        ----------
+        navigation_map : NavigationMap
+            The one the controller works on.
+        pose : Pose
+            Of the robot, in the frame of the map.
+        now : float
+        limits : AvoidanceParameters
+        """
+        known = navigation_map.tracked_objects(now) if limits.weight > 0.0 else ()
+        moving = moving_on_storey(known, pose.z)
+        rows = [(one.x - pose.x, one.y - pose.y, one.vx, one.vy, one.radius) for one in moving]
+        objects = np.array(rows, dtype=np.float32).reshape(-1, OBJECT_COLUMNS)
+        return cls(objects, pose.yaw, np.array(navigation_map.robot_box, dtype=np.float32), limits)
+
+    @property
+    def anybody(self) -> bool:
+        """Whether anything moves; if not, no motion meets anybody, and poses are not looked at."""
+        return len(self.objects) > 0
+
+    def meet(self, poses: Float32Array, step_time: float) -> Encounters:
+        """What motions meet.
+
+        Parameters
+        ----------
+        poses : (3, steps, n) float32
+            x, y [m] relative to the robot, axes of the map, and yaw [rad] after each step.
+        step_time : float
+            Length of a step [s].
+        """
+        p, samples = self.limits, poses.shape[2]
+        if not self.anybody:
+            return Encounters(np.zeros(samples, dtype=np.float32), np.zeros(samples, dtype=np.bool_))
+        stride = max(1, round(LOOK / step_time))
+        costs, touches = meet(poses, self.yaw, step_time, stride, self.box, self.objects, p.horizon, p.margin)
+        return Encounters(np.float32(p.weight) * costs, touches)
