@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, READ_ONLY, TOKEN, refuse_without
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.commands.waiting import waiting
 from mbf_ros.ending import wait_for_ctrl_c
@@ -32,6 +33,7 @@ def register(app: typer.Typer) -> None:
 
 
 def serve(
+    context: typer.Context,
     what: str = typer.Argument(
         ..., metavar="CONFIG|SCENARIO", help="A navigation file, whose robot is a client; or a scenario, simulated."
     ),
@@ -67,17 +69,28 @@ def serve(
     robot_only: bool = typer.Option(
         False, "--robot-only", help="Only the robot of a scenario, for a navigator that connects: see bridge connect."
     ),
+    foxglove: bool = FOXGLOVE,
+    foxglove_at: str = AT,
+    foxglove_token: bool = TOKEN,
+    foxglove_read_only: bool = READ_ONLY,
+    foxglove_origin: list[str] = ORIGIN,
 ) -> None:
     """Serve a navigator, or a simulated robot alone, to clients of rosbridge, until Ctrl-C."""
+    if not foxglove:
+        refuse_without(context, "--foxglove", *NAMES)
     with readable_errors():
+        from mbf_abstract.access.foxglove import FoxgloveOptions, live_robot
         from mbf_abstract.access.web_socket_server import ServerOptions
         from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
         from mbf_ros.rosbridge_robot.simulated_robot import serve_robot
         from mbf_ros.sensor_options import sensors_of
 
+        app = FoxgloveOptions.given(foxglove, foxglove_at, foxglove_token, foxglove_read_only, foxglove_origin)
         access = _access(host, token)
         server_options = ServerOptions(access, port, tuple(allow_origin), max_message)
         options = BridgeOptions(server_options, not keep_goals, stamped, sensors_of(sensor))
+        if robot_only and app is not None:
+            raise ValueError("--foxglove shows a navigator, which --robot-only leaves out")
         if robot_only and _is_navigation(Path(what)):
             raise ValueError("--robot-only is of scenarios; the robot of a navigation file is a client itself")
         with waiting("reading the configuration") as on_step:
@@ -85,7 +98,8 @@ def serve(
         served = serve_robot(session, options) if robot_only else serve_session(session, options, robot)
         with session, served as server:
             _report(server, options, robot is not None)
-            wait_for_ctrl_c()
+            with live_robot(app, session, session.navigator.send, Path(what).stem, typer.echo):
+                wait_for_ctrl_c()
 
 
 def _access(host: str, token: bool) -> PageAccess:

@@ -9,10 +9,9 @@ import numpy as np
 
 from mbf_abstract.drive_log import DriveLog, LoggedScan
 from mbf_abstract.events import Event
-from mbf_abstract.geometry import FloatArray, Pose
+from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.maps.tracking.contact import RobotBox
 from mbf_abstract.maps.view import MapView
 from mbf_abstract.server.map_server import MapServer
 from mbf_ros.bags.inputs import RecordedRobot
@@ -21,7 +20,6 @@ from mbf_ros.bags.planning import ReplayedPlan
 SCAN_PERIOD = 0.5  # s between two scans of a source that are kept, in bags of up to a quarter of an hour
 MOST_SCANS, MOST_POINTS = 2000, 5000  # of a source, and of a scan, that are kept to be shown
 MOST_COSTS = 200_000_000  # of all maps that are kept, four bytes each
-CORNERS = 16  # of the outline of a round robot
 
 
 class Observation:
@@ -50,7 +48,7 @@ class Observation:
         self.frame_id: str = served.map.frame_id
         self._transform_tolerance: float = served.transform_tolerance
         self.poses_unknown = 0
-        self._outline = outline_of(served.map.robot_box)
+        self._outline = served.map.robot_box.outline()
         self._rows: list[list[float]] = []
         self._scans: list[LoggedScan] = []
         self._next_scan: dict[str, float] = {}
@@ -124,13 +122,3 @@ class Observation:
             outcome=outcome,
             message=message,
         )
-
-
-def outline_of(box: RobotBox) -> FloatArray:
-    """Corners (n, 2) [m] of a robot's box, counter-clockwise; of a polygon around a round robot."""
-    if box.radius > 0.0:
-        angles = 2.0 * math.pi * np.arange(CORNERS) / CORNERS
-        return box.radius * np.array([(math.cos(angle), math.sin(angle)) for angle in angles.tolist()])
-    return np.array(
-        [(box.back, box.right), (box.front, box.right), (box.front, box.left), (box.back, box.left)], dtype=np.float64
-    )

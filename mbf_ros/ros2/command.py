@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, READ_ONLY, TOKEN, refuse_without
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from mbf_abstract.commands.waiting import waiting
 from mbf_ros.ending import shown_state
@@ -25,6 +26,7 @@ def register(app: typer.Typer) -> None:
 
 
 def ros2(
+    context: typer.Context,
     config: Path = typer.Argument(..., metavar="CONFIG", help="A navigation file."),
     sensor: list[str] = typer.Option(
         ["scan:LaserScan=scan", "points:PointCloud2=points", "range:Range=range"],
@@ -47,6 +49,11 @@ def ros2(
     amcl: bool = typer.Option(
         False, "--amcl", help="Answer Nav2's clients for amcl, too: the robot is localised by something else."
     ),
+    foxglove: bool = FOXGLOVE,
+    foxglove_at: str = AT,
+    foxglove_token: bool = TOKEN,
+    foxglove_read_only: bool = READ_ONLY,
+    foxglove_origin: list[str] = ORIGIN,
     ros_arguments: list[str] = typer.Argument(
         None,
         metavar="[-- ROS ARGUMENTS]",
@@ -54,11 +61,15 @@ def ros2(
     ),
 ) -> None:
     """Serve a navigator as the ROS 2 node move_base_flex, until Ctrl-C."""
+    if not foxglove:
+        refuse_without(context, "--foxglove", *NAMES)
     with readable_errors():
+        from mbf_abstract.access.foxglove import FoxgloveOptions, live_robot
         from mbf_ros.ros2.node import navigation_node
         from mbf_ros.ros2.options import NodeOptions
         from mbf_ros.sensor_options import sensors_of
 
+        app = FoxgloveOptions.given(foxglove, foxglove_at, foxglove_token, foxglove_read_only, foxglove_origin)
         options = NodeOptions(
             stamped,
             max_silence or None,
@@ -68,7 +79,10 @@ def ros2(
             nav2=nav2,
             stands_for_amcl=amcl,
         )
-        with navigation_node(config, options) as node:
+        with (
+            navigation_node(config, options) as node,
+            live_robot(app, node.session, node.go_to, config.stem, typer.echo),
+        ):
             _wait_for_end(node)
     if node.failure:
         typer.echo(f"error: the node has stopped the robot and ended: {node.failure}", err=True)

@@ -81,6 +81,12 @@ class RobotNavigation(ABC):
         """What does not come from the robot, or is not ready here; empty if a goal can be driven."""
         return self._robot.problem() or ("" if self._ready.is_set() else COMPILING)
 
+    def go_to(self, goal: MoveBaseGoal) -> AnyGoalHandle:
+        """Send a goal of nobody, as those of topics are; raises ValueError where none is taken yet, or any more."""
+        if reason := self._refusal():
+            raise ValueError(reason)
+        return self._send(goal)
+
     def close(self) -> None:
         """Stop the robot, end the goals and leave; once."""
         self._closing.close()

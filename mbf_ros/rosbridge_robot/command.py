@@ -6,6 +6,7 @@ from pathlib import Path
 
 import typer
 
+from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, READ_ONLY, TOKEN, refuse_without
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_ros.ending import shown_state, wait_for_ctrl_c
 from mbf_ros.rosbridge_robot.options import LinkOptions, RobotOptions, TimeSource
@@ -14,6 +15,7 @@ LOOK_PERIOD = 0.1  # s
 
 
 def connect(
+    context: typer.Context,
     address: str = typer.Argument(..., metavar="ADDRESS", help="The robot's rosbridge, e.g. ws://robot:9090."),
     config: Path = typer.Argument(..., metavar="CONFIG", help="A navigation file."),
     sensor: list[str] = typer.Option(
@@ -39,16 +41,26 @@ def connect(
     secret_file: Path = typer.Option(
         None, "--secret-file", help="File with the secret of a rosbridge that asks for auth.", dir_okay=False
     ),
+    foxglove: bool = FOXGLOVE,
+    foxglove_at: str = AT,
+    foxglove_token: bool = TOKEN,
+    foxglove_read_only: bool = READ_ONLY,
+    foxglove_origin: list[str] = ORIGIN,
 ) -> None:
     """Navigate a robot through its rosbridge server, until Ctrl-C."""
+    if not foxglove:
+        refuse_without(context, "--foxglove", *NAMES)
     with readable_errors():
+        from mbf_abstract.access.foxglove import FoxgloveOptions, live_robot
         from mbf_ros.rosbridge_robot.navigator import connect_navigator
         from mbf_ros.sensor_options import sensors_of
 
+        app = FoxgloveOptions.given(foxglove, foxglove_at, foxglove_token, foxglove_read_only, foxglove_origin)
         link = LinkOptions(secret=secret_file.read_text("utf-8").strip() if secret_file else "")
         options = RobotOptions(link, stamped, max_silence or None, sensors_of(sensor), cloud_period, time)
         with connect_navigator(address, config, options, _warn) as navigator:
-            wait_for_ctrl_c(shown_state(navigator.problem, typer.echo), LOOK_PERIOD)
+            with live_robot(app, navigator.session, navigator.go_to, config.stem, typer.echo):
+                wait_for_ctrl_c(shown_state(navigator.problem, typer.echo), LOOK_PERIOD)
 
 
 def _warn(text: str) -> None:

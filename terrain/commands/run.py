@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from mbf_abstract.commands.completion import complete_backend, complete_controller, complete_planner
+from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, READ_ONLY, TOKEN, refuse_without
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from terrain.commands.command_line import command_line
 from terrain.commands.compare import compare
@@ -77,17 +78,11 @@ def run(
     view_speed: float = typer.Option(
         1.0, "--view-speed", min=0.0, help="While watched: at most so many times real time; 0 = no limit."
     ),
-    foxglove: bool = typer.Option(False, "--foxglove", help="Serve the run live to Foxglove, until Ctrl-C."),
-    foxglove_at: str = typer.Option(
-        "127.0.0.1:8765", "--foxglove-at", metavar="HOST:PORT", help="Where; the next free port. Not encrypted."
-    ),
-    foxglove_token: bool = typer.Option(
-        True, "--foxglove-token/--no-foxglove-token", help="A token in the address, without which access is refused."
-    ),
-    foxglove_read_only: bool = typer.Option(False, "--foxglove-read-only", help="Watching only, no steering."),
-    foxglove_origin: list[str] = typer.Option(
-        [], "--foxglove-origin", help="Origin of another web app that may connect; repeatable."
-    ),
+    foxglove: bool = FOXGLOVE,
+    foxglove_at: str = AT,
+    foxglove_token: bool = TOKEN,
+    foxglove_read_only: bool = READ_ONLY,
+    foxglove_origin: list[str] = ORIGIN,
     ros2: bool = typer.Option(
         False, "--ros2", help="The robot is a node of ROS 2, and whoever publishes cmd_vel drives it; see docs/ros2.md."
     ),
@@ -110,10 +105,11 @@ def run(
     """
     chosen = settings_of(settings, planner=planner, controller=controller)
     if not foxglove:
-        refuse_without(context, "--foxglove", "foxglove_at", "foxglove_token", "foxglove_read_only", "foxglove_origin")
+        refuse_without(context, "--foxglove", *NAMES)
     if not ros2:
         refuse_without(context, "--ros2", "ros2_stamped", "ros2_lockstep", "ros2_patience")
     with readable_errors():
+        from mbf_abstract.access.foxglove import FoxgloveOptions
         from mbf_abstract.config.findings import ConfigError
         from mbf_abstract.server.plugin_host import ServerError
         from terrain.commands.live_line import LiveLine
@@ -121,7 +117,6 @@ def run(
         from terrain.scenarios.on_map import on_map
         from terrain.scenarios.scenario import load_scenario, scenario_file
         from terrain.session.runner import RunOptions, run_scenario
-        from terrain.viewer.foxglove.options import FoxgloveOptions, parsed_address
         from terrain.viewer.live.session import ViewOptions
         from terrain.viewer.results import write_joint_results, write_results
 
@@ -146,10 +141,8 @@ def run(
             )
             if view or foxglove:
                 page = ViewOptions(view_host, view_port, view_speed, view_token, view_read_only)
-                origins = tuple(foxglove_origin)
-                app = FoxgloveOptions(*parsed_address(foxglove_at), foxglove_token, foxglove_read_only, origins)
-                watches = (page if view else None, app if foxglove else None)
-                options = watched(replace(options, stay=stay), *watches, view_speed, live)
+                app = FoxgloveOptions.given(foxglove, foxglove_at, foxglove_token, foxglove_read_only, foxglove_origin)
+                options = watched(replace(options, stay=stay), page if view else None, app, view_speed, live)
             if ros2:
                 from terrain.commands.robot_on_ros import driven_over_ros, require_one_robot
 
@@ -166,14 +159,6 @@ def run(
         _open_replay(folder)
     if not result.success:
         raise typer.Exit(FAILURE)
-
-
-def refuse_without(context: typer.Context, needed: str, *names: str) -> None:
-    """Raise BadParameter where one of these parameters is given on the command line, without the option it needs."""
-    for name in names:
-        source = context.get_parameter_source(name)
-        if source is not None and source.name == "COMMANDLINE":
-            raise typer.BadParameter(f"it goes with {needed} only", param_hint=f"--{name.replace('_', '-')}")
 
 
 def _all_that_is_wrong(

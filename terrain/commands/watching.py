@@ -8,11 +8,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from mbf_abstract.access.foxglove import FoxgloveOptions
     from terrain.commands.live_line import LiveLine
     from terrain.session.goal_sequence import GoalSequence
     from terrain.session.run_options import RunOptions, Watch
     from terrain.session.session import Session
-    from terrain.viewer.foxglove.options import FoxgloveOptions
     from terrain.viewer.live.session import ViewOptions
 
 

@@ -23,6 +23,8 @@ SHARES = (1.0, 0.75, 0.5, 0.25)
 """Shares of a command that are tried, in this order, before the robot stops."""
 STEP = 0.1
 """Time [s] between two looks at robot and objects."""
+CORNERS = 16
+"""Of the outline of a round robot."""
 SAME_STOREY = 1.0
 """Objects whose ground is farther above or below the robot [m] are on another storey."""
 
@@ -58,6 +60,14 @@ class RobotBox(NamedTuple):
     def disc(cls, radius: float) -> RobotBox:
         """Box of a round robot."""
         return cls(0.0, 0.0, 0.0, 0.0, radius)
+
+    def outline(self) -> FloatArray:
+        """Corners (n, 2) [m], counter-clockwise; of a polygon around a round robot."""
+        if self.radius > 0.0:
+            angles = 2.0 * math.pi * np.arange(CORNERS) / CORNERS
+            return self.radius * np.array([(math.cos(angle), math.sin(angle)) for angle in angles.tolist()])
+        corners = (self.back, self.right), (self.front, self.right), (self.front, self.left), (self.back, self.left)
+        return np.array(corners, dtype=np.float64)
 
     def gaps(self, poses: FloatArray, places: FloatArray, radii: FloatArray) -> FloatArray:
         """Gaps (n, m) [m] of the robot at ``poses`` (n, 3) to discs at ``places`` (n, m, 2)."""

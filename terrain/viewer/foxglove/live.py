@@ -8,16 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
+from typing import Protocol
 
+from mbf_abstract.access.foxglove import FoxgloveOptions, report_addresses
 from mbf_abstract.access.web_socket_server import Offer, ServerOptions, WebSocketServer
 from mbf_abstract.events import Event, EventBus
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.pace import Pace
+from terrain.recording.recording import Recording
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session
-from terrain.viewer.foxglove.channels import FoxgloveClient
 from terrain.viewer.foxglove.feeds import RunFeed
-from terrain.viewer.foxglove.options import FoxgloveOptions, report_addresses
 from terrain.viewer.foxglove.protocol import SUBPROTOCOLS
 from terrain.viewer.foxglove.service import FoxgloveService
 from terrain.viewer.foxglove.steering import Steering
@@ -26,7 +27,6 @@ from terrain.viewer.live.orderly_end import orderly_ctrl_c
 
 PART_PERIOD = 0.05  # s of wall time at least between two parts
 SOURCE = "foxglove"
-FoxgloveServer = WebSocketServer[FoxgloveClient]
 Note = Callable[[str], None]
 
 
@@ -45,11 +45,74 @@ class ServerNotes:
         """Do nothing."""
 
 
-def foxglove_server(service: FoxgloveService, options: ServerOptions, note: Note) -> FoxgloveServer:
-    """Return a server, not started yet; what it reports is a note, and no event of the run."""
-    wall = WallClock()
-    offer = Offer(SOURCE, extra="foxglove", origin_option="--foxglove-origin", subprotocols=SUBPROTOCOLS)
-    return WebSocketServer(service, EventBus(wall.now, [ServerNotes(note)]), options, offer)
+class Feed(Protocol):
+    """Where parts come from."""
+
+    def part(self) -> Recording | None:
+        """Return what has come since the last part, None if there is nothing to show yet."""
+
+    def close(self) -> None:
+        """Follow no more."""
+
+
+class LiveServer:
+    """A server and the feed of its parts; open from ``start`` until it is closed.
+
+    Parameters
+    ----------
+    name : str
+        Shown by the app.
+    feed : Feed
+    steering : Steering
+    options : ServerOptions
+    note : callable
+        Takes what the user should know.
+    began : float
+        Time [s] of what is there from the start.
+
+    Attributes
+    ----------
+    port : int
+        Where it listens, once it has started.
+    """
+
+    def __init__(
+        self, name: str, feed: Feed, steering: Steering, options: ServerOptions, note: Note, began: float = 0.0
+    ) -> None:
+        self.port = 0
+        self._feed, self._note, self._options = feed, note, options
+        self._wall = WallClock()
+        self._next_part = 0.0
+        self._service = FoxgloveService(name, steering, self._post, note, began)
+        offer = Offer(SOURCE, extra="foxglove", origin_option="--foxglove-origin", subprotocols=SUBPROTOCOLS)
+        self._server = WebSocketServer(self._service, EventBus(self._wall.now, [ServerNotes(note)]), options, offer)
+
+    def start(self, title: str) -> None:
+        """Listen, and say where; raises ServerError where nothing can listen there."""
+        self._server.start()
+        self.port = self._server.port
+        report_addresses(self._options, self.port, self._note, title)
+
+    def close(self) -> None:
+        """Send the last part and listen no more; idempotent."""
+        self._send_part()
+        self._feed.close()
+        self._server.close()
+
+    def look(self) -> None:
+        """Hand on the next part, if the last one has been worked on and some time has passed; never waits."""
+        if self._service.is_ready and self._wall.now() >= self._next_part:
+            self._next_part = self._wall.now() + PART_PERIOD
+            self._send_part()
+
+    def _send_part(self) -> None:
+        part = self._feed.part()
+        if part is not None:
+            self._service.is_ready = False
+            self._server.post(self._service.publish, part)
+
+    def _post(self, call: Callable[..., None], *arguments: object) -> None:
+        self._server.post(call, *arguments)
 
 
 class LiveFoxglove:
@@ -70,8 +133,6 @@ class LiveFoxglove:
 
     Attributes
     ----------
-    port : int
-        Where it listens, once the context has been entered.
     access : PageAccess
         Who has access.
 
@@ -90,54 +151,41 @@ class LiveFoxglove:
         note: Note = lambda text: None,
         title: str = "Foxglove",
     ) -> None:
-        self.port = 0
-        self._session, self._sequence, self._speed = session, sequence, speed
-        self._note, self._title = note, title
-        self._options = options.server_options()
-        self.access = self._options.access
+        self._session, self._sequence, self._speed, self._title = session, sequence, speed, title
+        server_options = options.server_options()
+        self.access = server_options.access
         self._controls = controls = LiveControls(session, sequence, SOURCE, "Foxglove")
         steering = Steering(
             session.navigator.server, controls.go_to_pose, controls.cancel, controls.hold, controls.post
         )
-        self._service = FoxgloveService(f"mbf {session.scenario.name}", steering, self._post, note)
-        self._server = foxglove_server(self._service, self._options, note)
-        self._wall = WallClock()
-        self._pace = Pace(self._wall)
-        self._next_part = 0.0
+        name = f"mbf {session.scenario.name}"
+        self._server = LiveServer(name, RunFeed(session), steering, server_options, note)
+        self._pace = Pace(WallClock())
         self._exits = ExitStack()
+
+    @property
+    def port(self) -> int:
+        """Where it listens, once the context has been entered."""
+        return self._server.port
 
     def __enter__(self) -> LiveFoxglove:
         with ExitStack() as exits:
-            self._server.start()
             exits.callback(self._server.close)
-            self.port = self._server.port
-            self._feed = RunFeed(self._session)
-            exits.callback(self._feed.close)
+            self._server.start(self._title)
             end = self._controls.end
             exits.enter_context(orderly_ctrl_c(lambda: self._controls.post(lambda: end("Ctrl-C"))))
             self._exits = exits.pop_all()
         self._session.loop.on_tick.append(self._after_step)
-        report_addresses(self._options, self.port, self._note, self._title)
         return self
 
     def __exit__(self, *exc: object) -> None:
         self._session.loop.on_tick.remove(self._after_step)
-        self._send_part()
         self._exits.close()
-
-    def _post(self, call: Callable[..., None], *arguments: object) -> None:
-        self._server.post(call, *arguments)
 
     def _after_step(self, time: float) -> None:
         self._controls.work_off()
         self._pace.wait(time, self._limit())
-        if self._service.is_ready and self._wall.now() >= self._next_part:
-            self._next_part = self._wall.now() + PART_PERIOD
-            self._send_part()
-
-    def _send_part(self) -> None:
-        self._service.is_ready = False
-        self._server.post(self._service.publish, self._feed.part())
+        self._server.look()
 
     def _limit(self) -> float:
         """Simulated seconds per second; in real time while the run waits for a goal. A wall clock needs no pacing."""

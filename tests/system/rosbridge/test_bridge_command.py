@@ -1,5 +1,6 @@
 """``mbf bridge serve`` from the terminal: what it prints, how it ends, and what it refuses."""
 
+import json
 import signal
 import subprocess
 import sys
@@ -28,15 +29,19 @@ def config(tmp_path):
 
 @pytest.mark.parametrize(("signal_", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 128 + signal.SIGTERM)])
 def test_it_serves_until_it_is_interrupted_and_says_farewell(config, raw, ask, signal_, code):
-    process = subprocess.Popen([*MBF, str(config), "--port", "0", "--token"], stdout=subprocess.PIPE, text=True)
+    options = ["--port", "0", "--token", "--foxglove", "--foxglove-at", "127.0.0.1:0"]
+    process = subprocess.Popen([*MBF, str(config), *options], stdout=subprocess.PIPE, text=True)
     try:
-        lines = [process.stdout.readline() for _ in range(5)]
+        lines = [process.stdout.readline() for _ in range(6)]
         assert lines[0].startswith("page: http://127.0.0.1:") and lines[2].startswith("page, to watch only: http://")
         assert "the robot is the client that publishes /odom and /tf" in lines[4]
         port, _, path = lines[1].strip().removeprefix("rosbridge: ws://127.0.0.1:").partition("/")
         operation = {"op": "call_service", "service": "/rosapi/nodes"}
         socket = raw(int(port), path=f"/{path}")
         assert ask(socket, operation, "service_response")["values"] == {"nodes": ["/move_base_flex"]}
+        app_port, _, app_path = lines[5].split()[-1].removeprefix("ws://127.0.0.1:").partition("/")
+        app = raw(int(app_port), path=f"/{app_path}", subprotocols=["foxglove.sdk.v1"])
+        assert json.loads(app.recv(timeout=60))["name"] == "mbf robot"
         process.send_signal(signal_)
         with pytest.raises(ConnectionClosed, match="1001"):  # going away
             ask(socket, operation, "nothing")
@@ -53,6 +58,9 @@ def test_it_serves_until_it_is_interrupted_and_says_farewell(config, raw, ask, s
         (["--sensor", "/scan:Image=camera"], "got '/scan:Image=camera'"),
         (["--robot-only"], "--robot-only is of scenarios; the robot of a navigation file is a client itself"),
         (["--seed", "3"], "--backend and --seed are of scenarios"),
+        (["--robot-only", "--foxglove"], "--foxglove shows a navigator, which --robot-only leaves out"),
+        (["--foxglove-read-only"], "it goes with --foxglove only"),
+        (["--foxglove", "--foxglove-at", "here:there"], "expected HOST:PORT with a port"),
         (["--host", "192.0.2.1", "--port", "0"], "cannot listen at 192.0.2.1:0"),
     ],
 )

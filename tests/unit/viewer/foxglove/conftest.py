@@ -4,6 +4,7 @@ import base64
 import json
 import struct
 import threading
+import time
 from contextlib import ExitStack
 
 import pytest
@@ -11,12 +12,12 @@ from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 from websockets.sync.client import connect
 
+from mbf_abstract.access.foxglove import FoxgloveOptions
 from mbf_abstract.access.page_access import Role
 from terrain.session.executives import make_executive
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session
 from terrain.viewer.foxglove.live import LiveFoxglove
-from terrain.viewer.foxglove.options import FoxgloveOptions
 
 WITHIN = 60.0  # s; nothing waits that long unless it fails
 
@@ -33,8 +34,9 @@ class Client:
 
     def until(self, found):
         """Take frames until ``found()`` is true; return it."""
+        deadline = time.monotonic() + WITHIN
         while not (value := found()):
-            self._take(self.socket.recv(timeout=WITHIN))
+            self._take(self.socket.recv(timeout=deadline - time.monotonic()))
         return value
 
     def channel(self, topic):

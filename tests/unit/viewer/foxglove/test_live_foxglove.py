@@ -7,11 +7,11 @@ from functools import partial
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus, NegotiationError
 
+from mbf_abstract.access.foxglove import FoxgloveOptions
 from mbf_abstract.access.page_access import Role
 from mbf_abstract.access.web_socket_server import ServerError
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.viewer.foxglove.live import LiveFoxglove
-from terrain.viewer.foxglove.options import FoxgloveOptions
 from terrain.viewer.foxglove.protocol import SUBPROTOCOLS
 from terrain.viewer.logs.run_messages import TOPICS
 

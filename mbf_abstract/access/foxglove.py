@@ -1,13 +1,22 @@
-"""Where a server for Foxglove listens, and for whom."""
+"""Where a server for Foxglove listens, and for whom; the server itself is found by an entry point.
+
+A package that can show a robot live offers a function by an entry point of the group ``mbf.live_apps``, named
+``foxglove``, see ``terrain.viewer.foxglove.robot.serve_robot``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from importlib.metadata import entry_points
+from typing import Any
 
 from mbf_abstract.access.page_access import LOOPBACK, PageAccess, Role, is_loopback
 from mbf_abstract.access.web_socket_server import ServerOptions
+from mbf_abstract.session import NavigationSession
 
+LIVE_APPS_GROUP, FOXGLOVE = "mbf.live_apps", "foxglove"
 APP = "https://app.foxglove.dev"
 PORTS_TRIED = 20
 MAX_MESSAGE = 1_000_000  # bytes of a client's message
@@ -51,6 +60,13 @@ class FoxgloveOptions:
         access = (PageAccess.by_token if self.token else PageAccess.open)(self.host, self.read_only)
         return ServerOptions(access, self.port, (APP, *self.origins), MAX_MESSAGE, ports=PORTS_TRIED)
 
+    @classmethod
+    def given(
+        cls, wanted: bool, address: str, token: bool, read_only: bool, origins: Sequence[str]
+    ) -> FoxgloveOptions | None:
+        """Return the options of a command line, None where the server is not wanted; raises ValueError."""
+        return cls(*parsed_address(address), token, read_only, tuple(origins)) if wanted else None
+
 
 def parsed_address(text: str) -> tuple[str, int]:
     """Return host and port of ``HOST:PORT``, ``HOST`` or ``:PORT``; raises ValueError where the port is none."""
@@ -75,3 +91,42 @@ def report_addresses(options: ServerOptions, port: int, note: Callable[[str], No
             f"warning: other machines can reach {access.host}, and nothing is encrypted; who has or overhears the "
             f"address {drives}"
         )
+
+
+def live_robot(
+    options: FoxgloveOptions | None,
+    session: NavigationSession,
+    send: Callable[[Any], Any],
+    name: str,
+    note: Callable[[str], None],
+) -> AbstractContextManager[object]:
+    """Serve a robot live inside a block, if that is wanted.
+
+    Parameters
+    ----------
+    options : FoxgloveOptions, optional
+        None serves nothing.
+    session : NavigationSession
+        Its navigator is there, its clock one of real time.
+    send : callable
+        Takes goals of move_base; raises ValueError where none are taken.
+    name : str
+        Of the robot.
+    note : callable
+        Takes what the user should know.
+
+    Raises
+    ------
+    ValueError
+        A package is missing.
+    """
+    if options is None:
+        return nullcontext()
+    points = list(entry_points(group=LIVE_APPS_GROUP, name=FOXGLOVE))
+    if not points:
+        raise ValueError("--foxglove: no package that serves robots live is installed")
+    try:
+        serve: Callable[..., AbstractContextManager[object]] = points[0].load()
+    except ImportError as error:
+        raise ValueError(f"--foxglove needs more packages: pip install 'mbf-flex[foxglove]' ({error})") from error
+    return serve(session, send, options, name, note)
