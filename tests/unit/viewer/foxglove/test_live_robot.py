@@ -92,6 +92,7 @@ def test_nothing_is_shown_before_the_robot_is_heard_and_what_happened_then_comes
     with LoopbackSession(Pose.planar(1.0, 1.0)) as session:
         server = session.serve(*read_config(tmp_path / "robot.yaml"), session.robot, session.transforms)
         feed = RobotFeed(session, "loopback")
+        session.clock.sleep(0.1)
         session.transforms.clear()
         session.events.emit(EventKind.CUSTOM, "test", message="before")
         assert feed.part() is None
