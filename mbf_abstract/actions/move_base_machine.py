@@ -299,7 +299,8 @@ class MoveBaseMachine:
         wanted = self._job.handle.goal.recovery_behaviors
         if wanted is not None:
             return list(wanted)
-        kept_back = self._runtime.parameters.escalation_behaviors
+        parameters = self._runtime.parameters
+        kept_back = {*parameters.escalation_behaviors, parameters.right_of_way_behavior}
         return [name for name in self._plugins.names(PluginKind.RECOVERY) if name not in kept_back]
 
     def _reset_recovery_after_motion(self, pose: Pose) -> None:

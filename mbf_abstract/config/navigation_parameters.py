@@ -129,7 +129,7 @@ class NavigationParameters(ParameterModel):
     right_of_way_behavior: str = parameter(
         "",
         "Recovery behaviour of a robot that is blocked where it meets robots that announce their ways, before any "
-        "other, such as a give_way; empty = none.",
+        "other, such as a give_way. It is not among those that move_base runs by default. Empty = none.",
     )
     right_of_way_distance: float = parameter(
         0.8, "Two robots meet where their ways come nearer to each other than this.", unit="m", gt=0.0, le=5.0

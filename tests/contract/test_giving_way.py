@@ -383,3 +383,41 @@ def test_a_robot_that_waits_pulls_out_as_soon_as_the_other_one_cannot_yield(give
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
     assert "has pulled out" in result.message
     assert 2.4 < motion.end.x < 3.4 and motion.end.y > 3.7
+
+
+class PullingOut(Radio):
+    """The other robot stands beside the way from 2 s on."""
+
+    def anew(self, one):
+        off = (0.0, 2.0, 0.0) if self.clock.now() > 2.0 else (0.0, 0.0, 0.0)
+        return replace(super().anew(one), way=one.way[:1] + off)
+
+
+@pytest.mark.parametrize(("channel", "leaves"), [(PullingOut, True), (Radio, False)], ids=["leaves", "stays"])
+def test_the_map_keeps_only_robots_that_still_stand_where_they_met(give_way, world, channel, leaves):
+    """No ray passes the cells that the other one was seen on: it stands still beside the way, and nothing is sensed."""
+    seen = world.sensing()
+    world.see(seen, (5.3, 3.0), (5.2, 3.9))
+    result, _ = give_way(hall, traffic=head_on(9.0, channel(until=100.0)), navigation_map=seen, longest_wait=4.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert math.isfinite(world.cost_at(seen, 5.3, 3.0)) == leaves
+    assert math.isinf(world.cost_at(seen, 5.2, 3.9))
+
+
+def test_a_drive_that_somebody_stops_goes_on_once_they_are_gone(give_way, world):
+    """They close all ways out of the bay's mouth, and are gone when the robot stands."""
+    seen, stops = world.sensing(), []
+
+    def somebody_passes(pose):
+        if not stops and abs(pose.y - 3.0) > 0.1:
+            around = np.linspace(0.0, 2.0 * math.pi, 60)
+            world.see(seen, *((pose.x + 0.45 * math.cos(a), pose.y + 0.45 * math.sin(a)) for a in around))
+            stops.append(pose)
+        elif stops:
+            seen.clear()
+            seen.update(pose, 0.0)
+
+    result, motion = give_way(hall, distance=0.6, navigation_map=seen, on_the_way=somebody_passes)
+    assert stops
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert abs(motion.end.y - 3.0) > 0.5

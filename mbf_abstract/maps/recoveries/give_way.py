@@ -23,7 +23,7 @@ The server's ``recovery_patience`` must leave time for the drive and the wait.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 from typing import ClassVar
@@ -31,7 +31,7 @@ from typing import ClassVar
 import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
+from mbf_abstract.geometry import FloatArray, Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import Transform
@@ -46,7 +46,8 @@ from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.right_of_way import MEETING_LENGTH, right_of_way
 
 LOOKAHEAD = 0.25  # m to the point of the manoeuvre that is steered to
-ATTEMPTS = 3  # to drive to a place
+ATTEMPTS = 4  # to drive to a place
+PAUSE = 2.0  # s between two of them
 WAIT_PERIOD = 0.5  # s between two looks at where the other robots are
 MOVED = 0.2  # m, of another robot that does not stand
 MOST_WAITS = 3.0  # times longest_wait, for robots that move again and again
@@ -88,8 +89,14 @@ class GiveWayRecovery(GuardedRecovery):
     parameters: GiveWayParameters
 
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
-        """Pull out and wait; or wait first, where the right of way is this robot's."""
+        """Pull out and wait, or wait first, where the right of way is this robot's; then forget where others stood."""
         rivals = self._rivals()
+        stood = {rival.name: rival.way[0] for rival in rivals}
+        result = self._yield_or_wait(request, rivals)
+        self._forget_left_places(request.motion.pose(), stood)
+        return result
+
+    def _yield_or_wait(self, request: RecoveryRequest, rivals: Sequence[Announcement]) -> RecoveryResult:
         if rivals and not self._before(rivals):
             result = self._wait_for(request, rivals, "has the right of way over")
             rivals = self._rivals()
@@ -128,6 +135,7 @@ class GiveWayRecovery(GuardedRecovery):
             result = self._drive_along(begin, steps, request)
             if result.outcome != RecoveryOutcome.IMPASSABLE:
                 break
+            stand(request, PAUSE)  # somebody who moves there stops before this robot, or passes
         return result
 
     def _stand_aside(self, request: RecoveryRequest, before: list[Announcement]) -> RecoveryResult:
@@ -188,6 +196,16 @@ class GiveWayRecovery(GuardedRecovery):
         self.traffic.set_cannot_yield(True)
         result = self._wait_for(request, before, f"{failed.message}; asks for the right of way over")
         return replace(result, outcome=failed.outcome) if result.success and self._rivals() else result
+
+    def _forget_left_places(self, pose: Pose, stood: Mapping[str, FloatArray]) -> None:
+        """Free what the maps keep of places (3,) [m] that these robots have left: no ray passes all of its cells."""
+        now, size = self.clock.now(), self.parameters.distance
+        present = {other.name: other.way[0] for other in self.traffic.others(now)}
+        left = [place for name, place in stood.items() if norm(present.get(name, place) - place) > size]
+        for one in (self.maps.values() or [self.navigation_map]) if left else ():
+            for x, y, z in np.array(left).tolist():
+                one.clear_area(self.on_map(Pose.planar(x, y, z=z, frame_id=pose.frame_id), one), size)
+            one.update(self.on_map(pose, one), now)
 
     # -------------------------------------------------------------------------------------------------- the search
     def _manoeuvre(self, begin: Pose, request: RecoveryRequest) -> list[Step] | None:

@@ -151,6 +151,13 @@ def test_a_robot_that_stays_blocked_goes_on_with_its_usual_recoveries(make_sessi
     assert recoveries(session)[: MOST_MEETINGS + 1] == ["give_way"] * MOST_MEETINGS + ["clear"]
 
 
+def test_it_is_none_of_the_recoveries_that_move_base_runs_by_default(make_session):
+    session = make_session()
+    session.controller.play(BLOCKED, BLOCKED, BLOCKED)
+    assert not session.navigator.send(MoveBaseGoal(GOAL)).wait().success
+    assert recoveries(session) == ["clear", "back_up"]
+
+
 def test_a_behaviour_that_is_not_loaded_refuses_a_goal_of_move_base(make_session):
     session = make_session(right_of_way_behavior="step_aside")
     handle = session.navigator.send(MoveBaseGoal(GOAL))
