@@ -7,18 +7,18 @@ seeds: both may give way at first, the waits they draw let one go on before the 
 The way is the track that the robot has driven, straight ahead and straight on behind the track. The nearest place is
 searched where the base stands ``distance`` from all of it, by the shortest manoeuvre on which the outline touches
 nothing the map knows: back into a bay, around a corner, or a step aside in a hall; see ``maps.pull_out``. It is driven
-slowly, each command checked as in every recovery, and searched anew where a command is refused, ``ATTEMPTS`` times in
-all; afterwards the robot stands for a time that is drawn anew for each run. Where there is no such place it ends with
-IMPASSABLE at once.
+slowly, each command checked as in every recovery. Where a command is refused, the robot waits for ``PAUSE``, in which
+somebody who moves there stops or passes, and searches anew, ``ATTEMPTS`` times in all; afterwards it stands for a time
+that is drawn anew for each run. Where there is no such place it ends with IMPASSABLE at once.
 
 Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
 goes first waits until the others are out of its way, the others pull out, also out of the way that the first one has
 announced, and wait until it has passed. Both wait while the others move, and ``longest_wait`` longer, but not more than
 ``MOST_WAITS`` times as long in all. One that finds no place, or does not get there, announces that, and then goes
 first. One that goes first and has waited in vain announces that, too: then the others go first, and it pulls out
-itself.
+itself. In the end the maps forget what they keep of places where the others stood and have left.
 
-The server's ``recovery_patience`` must leave time for the drive and the wait.
+The server's ``recovery_patience`` must leave time for drive and wait.
 """
 
 from __future__ import annotations
