@@ -7,6 +7,7 @@ A planner for meshes derives ``MeshPlanner`` and finds its map in ``self.mesh_ma
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from mbf_abstract.maps.navigation_map import MapContext, MapPlugin
 from mbf_abstract.plugins import AbstractController, AbstractPlanner, AbstractRecovery, AbstractRefiner
@@ -32,6 +33,9 @@ class MeshPlanner(MeshPlugin, AbstractPlanner):
 
 class MeshController(MeshPlugin, AbstractController):
     """Follows a path over the surface of a triangle mesh."""
+
+    drives_on_part: ClassVar[bool] = True
+    """Whether the part of the mesh around the robot is enough for it, as on a map of tiles."""
 
     @property
     def limit_factor(self) -> float:

@@ -54,6 +54,7 @@ class VectorFieldController(MeshController):
 
     Parameters = VectorFieldParameters
     parameters: VectorFieldParameters
+    drives_on_part = False
 
     _approach: GoalApproach | None = None
 

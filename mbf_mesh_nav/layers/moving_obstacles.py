@@ -41,6 +41,8 @@ from mbf_mesh_nav.map.layer_graph import union_of
 DOWN = np.array([0.0, 0.0, -1.0])
 SURFACE_DISTANCE = 1.0
 """How far [m] a predicted place may be off the surface; farther on there is none."""
+AT_VERTEX = 1e-6
+"""How far [m] a vertex may be from itself on the surface: rounding."""
 
 
 class MovingObstaclesLayerParameters(LayerParameters, MovingObstaclesParameters):
@@ -84,6 +86,20 @@ class MovingObstaclesLayer(MeshLayer):
     def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
         """The objects it follows."""
         return self._objects.objects(now)
+
+    def take_over(self, old: MeshLayer) -> None:
+        """Take over the objects with their sensors, and the trails on this part of the surface."""
+        assert isinstance(old, MovingObstaclesLayer)
+        self._objects = old._objects
+        self._trail[self._same_vertices(old.topology.vertices[old._trail])] = True
+        self._left = self._same_vertices(old.topology.vertices[old._left])
+
+    def _same_vertices(self, places: FloatArray) -> IntArray:
+        """Vertices, ascending, that lie at places (n, 3) of vertices of another part of the surface."""
+        spots = self.locator.locate(places, AT_VERTEX)
+        known = spots.faces >= 0
+        corners = np.argmax(spots.barycentric[known], axis=1)
+        return np.unique(self.topology.faces[spots.faces[known], corners])
 
     @classmethod
     def reach(cls, parameters: Any) -> float:

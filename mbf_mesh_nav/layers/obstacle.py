@@ -115,6 +115,13 @@ class ObstacleLayer(MeshLayer):
         lethal[self.topology.faces[self._hits.faces]] = True
         return np.where(lethal, np.inf, 0.0).astype(np.float32), lethal
 
+    def take_over(self, old: MeshLayer) -> None:
+        """Take over sensors, scans that wait, and the hits above this part of the surface."""
+        assert isinstance(old, ObstacleLayer)
+        self._watches, self._waiting = old._watches, old._waiting
+        faces = self._below(old._hits.points)
+        self._hits = old._hits._replace(faces=faces).where(faces >= 0)
+
     def insert_scan(self, scan: RangeScan) -> None:
         """Keep a scan for the next update."""
         self._watches.setdefault(scan.source, SourceWatch(scan.source)).heard(scan.stamp)
@@ -183,9 +190,14 @@ class ObstacleLayer(MeshLayer):
         least = max(settings.min_obstacle_dist, NO_RANGE)
         near = points[(distances > least) & (distances <= settings.max_obstacle_dist)]
         near = near[self.locator.locate(near, settings.ground_tolerance).faces < 0]
-        down = np.array(settings.down_axis) / norm(settings.down_axis)
-        faces, _ = self.locator.cast_rays(near, down, settings.robot_height)
+        faces = self._below(near)
         return faces[faces >= 0], near[faces >= 0]
+
+    def _below(self, points: FloatArray) -> IntArray:
+        """Faces (n,) that points (n, 3) project onto, -1 where there is none within ``robot_height``."""
+        down = np.array(self.parameters.down_axis) / norm(self.parameters.down_axis)
+        faces, _ = self.locator.cast_rays(points, down, self.parameters.robot_height)
+        return faces
 
     def _still_valid(self, hits: Hits, scan: RangeScan, sensor: int) -> BoolArray:
         """Mask of the kept hits that this scan neither outdates nor sees through.

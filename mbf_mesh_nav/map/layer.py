@@ -128,6 +128,14 @@ class MeshLayer(map_layer.MapLayer):
         self._costs, self._lethal = costs, lethal
         return changed
 
+    def take_over(self, old: MeshLayer) -> None:
+        """Know what a layer of the same class has sensed on another part of the same surface, before ``compute``.
+
+        Called for a map whose part in memory follows the robot. What lies off this part is forgotten. The old layer
+        takes no update any more, but may still be given a scan by another thread: it is to end up here. A layer that
+        does not override this knows nothing until its next scan.
+        """
+
     def update_from_inputs(self, changed: IntArray) -> IntArray:
         """React to changed vertices of the inputs; return the own vertices that changed."""
         return self.recompute() if len(changed) else NOTHING_CHANGED

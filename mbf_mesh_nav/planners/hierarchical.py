@@ -88,7 +88,7 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         for first, last in itertools.pairwise(places):
             plan = self._plan(first, last, flag)
             if plan.outcome != GetPathOutcome.SUCCESS:
-                problem = _failed(plan)
+                problem = self._failed(plan)
                 break
             plans.append(plan)
         near_goal = problem is not None and len(plans) == len(request.via) and request.dist_tolerance > 0.0
@@ -144,6 +144,11 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
                 return failed_plan(GetPathOutcome.CANCELED, "")
             return plan_between(self._tiled, first, last, tolerance=self.parameters.cost_tolerance, cancel_flag=flag)
 
+    def _failed(self, plan: TiledPlan) -> PlanResult:
+        """Of a plan that failed; on a map that no sensor changes, planning again does not help."""
+        permanent = plan.outcome == GetPathOutcome.NO_PATH_FOUND and not self._map.senses
+        return PlanResult(plan.outcome, plan.message, permanent=permanent)
+
     def _limited(self, problem: PlanResult | None, request: PlanRequest) -> PlanResult | None:
         """A problem for which no place near the goal helps, with the limit of the tolerance if that was the cause."""
         if problem is None or request.dist_tolerance <= self._searched:
@@ -178,8 +183,3 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
                 return None
             without_path.add(int(group[vertex]))
         return None
-
-
-def _failed(plan: TiledPlan) -> PlanResult:
-    """Of a plan that failed; as the map does not change by itself, planning again does not help."""
-    return PlanResult(plan.outcome, plan.message, permanent=plan.outcome == GetPathOutcome.NO_PATH_FOUND)

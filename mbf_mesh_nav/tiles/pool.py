@@ -87,11 +87,23 @@ class TilePool:
         vertices = self._used * self._vertices_of_slot
         return self._distances[:vertices], self._predecessors[:vertices]
 
+    def holds(self, key: TileKey) -> bool:
+        """Whether a tile is loaded and has not changed since."""
+        return key in self._links
+
+    def reweigh(self, key: TileKey, tile: Tile, seen: TileGraph) -> None:
+        """Take over other weights of a tile that it holds; its links are closed until the next corridor."""
+        slot = self._slot_of[key]
+        first, first_edge = slot * self._vertices_of_slot, slot * self._edges_of_slot
+        weights = _with_links(tile, seen)
+        self._weights[first_edge : first_edge + len(weights)] = weights
+        self._blocked[first : first + tile.core_vertices] = seen.graph.blocked
+
     def drop(self, key: TileKey) -> None:
         """Load a tile anew when it is needed next, because it changed."""
         if key in self._slot_of:
             self._slot_of.move_to_end(key, last=False)
-            self._links.pop(key)
+            self._links.pop(key, None)
 
     def hold(self, keys: Iterable[TileKey], read: Callable[[TileKey], tuple[Tile, TileGraph]]) -> None:
         """Load those of at most ``slots`` tiles that have no slot; ``read`` gives a tile with its weights."""
@@ -114,7 +126,7 @@ class TilePool:
         # 1. One more edge at the end of the row of every shared vertex.
         ends = tile.offsets[tile.shared + 1]
         neighbours = np.insert(tile.neighbours, ends, tile.shared)
-        weights = np.insert(seen.graph.weights, ends, np.float32(np.inf))
+        weights = _with_links(tile, seen)
         extra = np.zeros(count + 1, dtype=np.int32)
         extra[tile.shared + 1] = 1
         offsets = tile.offsets + np.cumsum(extra, dtype=np.int32)
@@ -163,3 +175,8 @@ class TilePool:
         vertices, edges = self._used * self._vertices_of_slot, self._used * self._edges_of_slot
         rows = self._offsets[: vertices + 1], self._neighbours[:edges], self._weights[:edges]
         return frozen_graph(*rows, self._blocked[:vertices])
+
+
+def _with_links(tile: Tile, seen: TileGraph) -> Float32Array:
+    """Weights of a tile's edges, with that of the impassable link at the end of the row of every shared vertex."""
+    return np.insert(seen.graph.weights, tile.offsets[tile.shared + 1], np.float32(np.inf))

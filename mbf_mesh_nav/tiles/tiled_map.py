@@ -4,7 +4,7 @@
     plan = plan_on_tiles(tiled, start, goal)
 
 Opening reads the index and the portals of all tiles, some hundred bytes for each portal; tiles are read when they are
-needed. Both keep to ``memory``.
+needed. Both keep to ``memory``. Beside it stay the tiles with costs that sensors have raised, see ``lay_over``.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from mbf_mesh_nav.tiles.index import TileIndex, read_index
 from mbf_mesh_nav.tiles.places import TilePlace, find_place
 from mbf_mesh_nav.tiles.pool import TilePool
 from mbf_mesh_nav.tiles.portals import PortalGraph, TilePortals, estimated_costs
+from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED, SensedCosts
 from mbf_mesh_nav.tiles.tile import Tile, TileKey, read_tile, read_tile_arrays, tile_file, write_tile
 from mbf_mesh_nav.tiles.tile_graph import TileGraph, costs_between_portals, tile_graph
 
@@ -78,9 +79,18 @@ class TiledMap:
             text = f"its tiles need {least:.3g} MB of memory, allowed are {memory / 1e6:.3g} MB"
             raise MeshError(str(folder), [text])
         self._kept: OrderedDict[TileKey, tuple[Tile, TileGraph]] = OrderedDict()
+        self._sensed = NOTHING_SENSED
+        self._raised: dict[TileKey, tuple[Tile, TileGraph]] = {}  # tiles with sensed costs, and weights with them
+
+    @property
+    def profile_layer(self) -> str:
+        """Name of the layer that the profile looks at."""
+        return self.index.layers[self._layer]
 
     def tile(self, key: TileKey) -> tuple[Tile, TileGraph]:
         """A tile and its weights, from memory if it was asked for lately."""
+        if key in self._raised:
+            return self._raised[key]
         if key not in self._kept:
             self._kept[key] = self._read(key)
             if len(self._kept) > KEPT_TILES:
@@ -90,7 +100,25 @@ class TiledMap:
 
     def hold(self, keys: list[TileKey]) -> None:
         """Load tiles into the pool."""
-        self.pool.hold(keys, lambda key: self._kept[key] if key in self._kept else self._read(key))
+        self.pool.hold(keys, lambda key: self._raised.get(key) or self._kept.get(key) or self._read(key))
+
+    def lay_over(self, sensed: SensedCosts) -> None:
+        """Plan from now on with the worse of the stored and the sensed costs; in memory only, in place of earlier ones.
+
+        Raises
+        ------
+        MeshError
+            A tile is damaged; the earlier ones stay.
+        """
+        if sensed is self._sensed:
+            return
+        near = self.index.tiles_in(sensed.box) if len(sensed.numbers) else []
+        raised = {key: found for key in near if (found := self._with_sensed(key, sensed)) is not None}
+        freed = [key for key in self._raised if key not in raised]
+        self._sensed, self._raised = sensed, raised
+        for key in (*freed, *raised):
+            if self.pool.holds(key):
+                self.pool.reweigh(key, *self.tile(key))
 
     def find_place(self, position: FloatArray, reach: float) -> TilePlace | None:
         """The place on the surface nearest to a position (3,) [m], as ``borders.on_surface``; None off the surface.
@@ -138,7 +166,16 @@ class TiledMap:
         self.portals.change(key, changed)
         self.estimates.change(key, self._estimated(changed))
         self._kept.pop(key, None)
+        if self._raised.pop(key, None) is not None and (raised := self._with_sensed(key, self._sensed)) is not None:
+            self._raised[key] = raised
         self.pool.drop(key)
+
+    def _with_sensed(self, key: TileKey, sensed: SensedCosts) -> tuple[Tile, TileGraph] | None:
+        """A tile and its weights with sensed costs; None if none of them is on it."""
+        tile, _ = self.tile(key)
+        stored = tile.costs[self._layer], tile.lethal[self._layer]
+        values = sensed.laid_over(tile.numbers[: tile.core_vertices], *stored)
+        return None if values is None else (tile, tile_graph(tile, *values, self.profile))
 
     def _estimated(self, bounds: TilePortals) -> TilePortals:
         length = self.index.portal_length

@@ -17,9 +17,12 @@ from mbf_mesh_nav.layers.inflation import InflationLayer
 from mbf_mesh_nav.layers.obstacle import ObstacleLayer
 from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph
+from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.plugins import MeshContext
+from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
+from mbf_mesh_nav.tiles.sources import MeshSource
 
 RADIUS = 0.2  # m, of the robot
 
@@ -197,6 +200,26 @@ mesh_map:
 """
 )
 
+TILES = (
+    PLUGINS
+    + """
+backend: tiles
+planners: [{name: far, type: tiles.hierarchical}]
+controllers: [{name: follower, type: path_follower}]
+tiled_map:
+  folder: floor
+  inscribed_radius: 0.3
+  default_layer: safe
+  layers:
+    - {name: obstacles, type: obstacle}
+    - {name: moving, type: moving_obstacles, inputs: [obstacles]}
+    - {name: inflation, type: inflation, inputs: [moving]}
+    - {name: safe, type: max_combination, inputs: [inflation, moving]}
+  obstacles: {sources: [lidar]}
+  moving: {sources: [lidar], inscribed_radius: 0.3}
+  inflation: {inscribed_radius: 0.3, inflation_radius: 0.5, lethal_value: .inf, inscribed_value: 1.0}
+"""
+)
 
 GRAPH = (
     PLUGINS
@@ -232,6 +255,18 @@ def mesh_server(rig, controller="path_follower", **parameters):
     return rig.server(MESH.replace("path_follower", controller), parameters)
 
 
+def tiles_server(rig, **parameters):
+    """On tiles of 5 m, whose borders cross the ways of the situations.
+
+    Paths follow edges: the diagonals of this floor lead the way of the goals, so no path has a detour for them.
+    """
+    vertices, faces = heightfield_mesh(np.zeros((41, 61)), 0.2, 0.2)
+    floor = MeshSource(vertices * (-1.0, 1.0, 1.0) + (12.0, 0.0, 0.0), faces[:, ::-1])
+    layers = (MeshLayerEntry(name="slope", type="steepness"),)
+    build_tiles(floor, rig.folder / "floor", TileSettings(mesh_map=MeshMapParameters(layers=layers), tile_size=5.0))
+    return rig.server(TILES, parameters)
+
+
 def elevation_grid_server(rig, **parameters):
     np.save(rig.folder / "flat.npy", np.zeros((81, 121)))
     return rig.server(ELEVATION_GRID, parameters)
@@ -244,6 +279,7 @@ def occupancy_octree_server(rig, **parameters):
 BACKENDS = {
     "costmap": costmap_server,
     "mesh": mesh_server,
+    "tiles": tiles_server,
     "elevation_grid": elevation_grid_server,
     "occupancy_octree": occupancy_octree_server,
 }

@@ -1,24 +1,24 @@
 """A tiled map behind the contract of navigation maps: every question is answered on the surroundings of its place.
 
-Surroundings are squares of a grid with a margin as wide as the question needs. Some are kept, as questions about one
-robot or one path are about places near each other. They are cut out of tiles of their own, so no question waits for a
-search.
+These are the window around the robot where it holds all that the question looks at, and ``squares`` elsewhere. What
+sensors have seen in the window counts for squares and for plans, too.
 """
 
 from __future__ import annotations
 
-import math
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.maps.navigation_map import NavigationMap, PlaceCheck
+from mbf_abstract.maps.layered_map import LayeredMap
+from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.view import GridView
 from mbf_mesh_nav.arrays import FlagArray
-from mbf_mesh_nav.map.layer import CostArray, LethalArray
+from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray
+from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.places import OUTSIDE
 from mbf_mesh_nav.map.places import SURFACE_DISTANCE as OF_PLACES
@@ -28,46 +28,56 @@ from mbf_mesh_nav.mesh.motion_check import UNKNOWN_RADIUS
 from mbf_mesh_nav.tiles.portals import NOT_CANCELLED
 from mbf_mesh_nav.tiles.serving.overview import overview
 from mbf_mesh_nav.tiles.serving.recently_used import RecentlyUsed
-from mbf_mesh_nav.tiles.serving.surroundings import mesh_within
-from mbf_mesh_nav.tiles.tile import Tile, TileKey
-from mbf_mesh_nav.tiles.tiled_map import TiledMap, sound_tile
+from mbf_mesh_nav.tiles.serving.squares import Squares
+from mbf_mesh_nav.tiles.serving.window import FollowingWindow
+from mbf_mesh_nav.tiles.serving.window_settings import WindowSettings
+from mbf_mesh_nav.tiles.tile import TileKey
+from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
-CELL = 32.0
-"""Side of a square of the grid, in distances between vertices."""
-LEAST_MARGIN, MOST_MARGIN = 8.0, 512.0
-"""Of surroundings around their square, in distances between vertices; the least one doubled as often as needed."""
-BEYOND = 2.0
-"""How much wider than the question's radius a margin is, in distances between vertices."""
-KEPT_VERTICES = 400_000
-"""Of surroundings that are kept; one vertex takes some 370 bytes."""
-OF_A_SQUARE = 1000
-"""Vertices that surroundings count for besides their own, so that there are not too many small or empty ones."""
-KEPT_TILES = 4
-"""Tiles that surroundings were cut out of and that stay loaded."""
 SEARCHED = 128.0
 """A pose where the robot fits is looked for so far away, in distances between vertices."""
 CANCEL_PERIOD = 0.05
 """How often [s] a goal that waits for the search of another one looks whether it is cancelled."""
 
 
-class TiledNavigationMap(NavigationMap):
-    """A map of tiles with its stored layers; nothing senses, nothing changes but by ``change_layer``.
+class TiledNavigationMap(LayeredMap):
+    """A map of tiles.
+
+    Parameters
+    ----------
+    window : WindowSettings, optional
+        Of the part around the robot that changes. Without it nothing senses, and nothing changes but by
+        ``change_layer``.
 
     Attributes
     ----------
     tiled : TiledMap
         Takes one thread at a time: see ``turn_to_search``.
+
+    Raises
+    ------
+    MeshError
+        A tile is damaged.
     """
 
+    layers: LayerGraph
+
     def __init__(
-        self, tiled: TiledMap, inscribed_radius: float = 0.0, max_turning_slope: float = MeshMap.max_turning_slope
+        self,
+        tiled: TiledMap,
+        inscribed_radius: float = 0.0,
+        max_turning_slope: float = MeshMap.max_turning_slope,
+        window: WindowSettings | None = None,
     ) -> None:
+        super().__init__()
         self.tiled = tiled
         self.frame_id = tiled.index.frame_id
+        self.follows_robot = window is not None
         self._searching = threading.Lock()
         self._radius, self._max_turning_slope = inscribed_radius, max_turning_slope
-        self._tiles: RecentlyUsed[TileKey, Tile] = RecentlyUsed(self._read, KEPT_TILES)
-        self._squares = RecentlyUsed(self._cut_out, KEPT_VERTICES, _size)
+        self._squares = Squares(tiled)
+        self._window = None if window is None else FollowingWindow(tiled, self._squares, window)
+        self.layers = LayerGraph() if self._window is None else self._window.now.map.layers
         self._views: RecentlyUsed[str, GridView] = RecentlyUsed(self._picture, len(tiled.index.layers))
 
     @property
@@ -76,14 +86,25 @@ class TiledNavigationMap(NavigationMap):
         return self._radius or self.tiled.index.inscribed_radius
 
     @property
+    def senses(self) -> bool:
+        """Whether sensors change the map."""
+        return self._window is not None and self._window.senses
+
+    @property
     def reach(self) -> float:
         """How far [m] around a place a question can look."""
-        return (MOST_MARGIN - BEYOND) * self.tiled.index.spacing
+        return self._squares.reach
+
+    @property
+    def window_map(self) -> MeshMap:
+        """The window around the robot, another one when it has moved; ValueError on a map without."""
+        if self._window is None:
+            raise ValueError("the map of tiles has no window around the robot")
+        return self._for_robot(self._window.now.map)
 
     def take_parameters(self, parameters: Any) -> None:
         """Take over ``inscribed_radius``."""
         self._radius = parameters.inscribed_radius
-        self._squares.clear()
 
     @contextmanager
     def turn_to_search(self, cancel_flag: FlagArray = NOT_CANCELLED) -> Iterator[bool]:
@@ -93,6 +114,8 @@ class TiledNavigationMap(NavigationMap):
                 yield False
                 return
         try:
+            if self._window is not None:
+                self.tiled.lay_over(self._window.now.sensed())
             yield True
         finally:
             self._searching.release()
@@ -101,9 +124,11 @@ class TiledNavigationMap(NavigationMap):
         """``TiledMap.change_layer``, between two searches; every later question and plan has the new values."""
         with self.turn_to_search():
             self.tiled.change_layer(key, layer, costs, lethal)
-        # Tiles first: what is cut out in between has the new ones.
-        for made_of_tiles in (self._tiles, self._squares, self._views):
-            made_of_tiles.clear()
+        self._squares.clear()
+        self._views.clear()
+        if self._window is not None:
+            self._window.renew()
+            self.layers = self._window.now.map.layers
 
     def view(self, layer: str) -> GridView:
         """The costs of a layer from above; the first time, and after a change, all tiles are read for it.
@@ -126,10 +151,12 @@ class TiledNavigationMap(NavigationMap):
             A tile is damaged.
         """
         self._check_reach(radius)
-        spacing, margin = self.tiled.index.spacing, LEAST_MARGIN
-        while (margin - BEYOND) * spacing < radius:
-            margin *= 2.0
-        return self._squares.get((math.floor(x / (CELL * spacing)), math.floor(y / (CELL * spacing)), margin))
+        window = None if self._window is None else self._window.now
+        if window is None:
+            found = self._squares.around(x, y, radius)
+        else:
+            found = window.map if window.holds(x, y, radius) else self._squares.around(x, y, radius, window.sensed())
+        return None if found is None else self._for_robot(found)
 
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
         """Heights of all surfaces at a place, the lowest free one first; see ``ground.ground_heights``."""
@@ -195,7 +222,42 @@ class TiledNavigationMap(NavigationMap):
         there = self.around(pose.x, pose.y, within + OF_ROBOTS)
         return None if there is None else there.nearest_obstacle(pose, within)
 
+    # -------------------------------------------------------------------------------------------------- layers
+    def update(self, robot_pose: Pose | None, now: float) -> None:
+        """Take in what sensors have seen, see ``FollowingWindow.update``; overrides of parameters that are over end."""
+        self.end_overrides(now)
+        if self._window is not None:
+            try:
+                self._window.update(robot_pose, now)
+            finally:
+                self.layers = self._window.now.map.layers
+
+    def stale_reason(self, now: float) -> str:
+        """Why the map is not current at ``now`` [s]; without a window it is."""
+        return "" if self._window is None else self._window.stale_reason(now)
+
+    def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
+        """Forget all sensed obstacles, or those in some layers, at once; return the names of the layers."""
+        return [] if self._window is None else self._window.cleared(lambda one: one.clear(layer_names))
+
+    def clear_area(
+        self, center: Pose, size: float, layer_names: Iterable[str] | None = None, *, inside: bool = True
+    ) -> list[str]:
+        """Forget obstacles sensed inside, or outside, a cube of edge ``size`` [m] around a pose, as ``clear``."""
+        if self._window is None:
+            return []
+        return self._window.cleared(lambda one: one.clear_area(center, size, layer_names, inside=inside))
+
+    def _replace_parameters(self, name: str, parameters: LayerParameters) -> None:
+        if self._window is not None:  # else there is no layer of that name
+            self._window.set_layer_parameters(name, parameters)
+
     # ---------------------------------------------------------------------------------------------- surroundings
+    def _for_robot(self, mesh_map: MeshMap) -> MeshMap:
+        """A part of the map with the robot's figures of now."""
+        mesh_map.inscribed_radius, mesh_map.max_turning_slope = self.inscribed_radius, self._max_turning_slope
+        return mesh_map
+
     @property
     def _limit(self) -> str:
         return f"{self.reach:.4g} m"
@@ -207,23 +269,5 @@ class TiledNavigationMap(NavigationMap):
                 f"the limit on this map of tiles is {self._limit}"
             )
 
-    def _read(self, key: TileKey) -> Tile:
-        return sound_tile(self.tiled.folder, self.tiled.index, key)
-
-    def _cut_out(self, square: tuple[int, int, float]) -> MeshMap | None:
-        """Surroundings of a square of the grid: column, row, and margin in distances between vertices."""
-        column, row, margin = square
-        spacing = self.tiled.index.spacing
-        low = (column * CELL - margin) * spacing, (row * CELL - margin) * spacing
-        high = ((column + 1) * CELL + margin) * spacing, ((row + 1) * CELL + margin) * spacing
-        found = mesh_within(self.tiled, low, high, self._tiles.get)
-        if found is not None:
-            found.inscribed_radius, found.max_turning_slope = self.inscribed_radius, self._max_turning_slope
-        return found
-
     def _picture(self, layer: str) -> GridView:
         return overview(self.tiled, self.tiled.index.layers.index(layer))
-
-
-def _size(surroundings: MeshMap | None) -> float:
-    return OF_A_SQUARE + (0 if surroundings is None else len(surroundings.vertices))

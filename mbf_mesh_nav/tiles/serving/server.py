@@ -1,20 +1,23 @@
 """The server on a map of tiles.
 
-The configuration has one section, ``tiled_map``; the layers are those the tiles were built with. Plugin types are
-looked for with the prefix ``mesh.``, the planner is ``tiles.hierarchical``. Behaviours that know their map by its
-contract only work, plugins for one mesh are refused.
+The configuration has one section, ``tiled_map``; its layers sense and come on top of those the tiles were built with.
+Plugin types are looked for with the prefix ``mesh.``, the planner is ``tiles.hierarchical``. Controllers for meshes
+drive on a window around the robot, other plugins for one mesh are refused.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
 from mbf_abstract.config.configuration import Config, PluginSpec
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
+from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.maps.navigation_map import MapContext
 from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.maps.view import GridView
@@ -22,11 +25,14 @@ from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.server.plugin_host import ServerError
+from mbf_mesh_nav.map.map_builder import MeshLayerEntry
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.plugins import MeshPlugin
+from mbf_mesh_nav.plugins import MeshController, MeshPlugin
 from mbf_mesh_nav.tiles.index import is_tile_folder, read_index
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
+from mbf_mesh_nav.tiles.serving.window_controller import WindowController
+from mbf_mesh_nav.tiles.serving.window_settings import WindowSettings, window_settings
 from mbf_mesh_nav.tiles.tiled_map import DEFAULT_MEMORY, TiledMap
 
 BARE_TILES = """\
@@ -39,8 +45,6 @@ planners:
 tiled_map:
   folder: {folder}
 """
-UPDATE_FREQUENCY = 1.0
-"""Hz; nothing changes the map by itself."""
 
 
 class TiledMapParameters(ParameterModel):
@@ -61,6 +65,24 @@ class TiledMapParameters(ParameterModel):
         gt=0.0,
         le=1.5,
         dynamic=False,
+    )
+    window: float = parameter(
+        40.0,
+        "Side of the part around the robot that sensors mark and controllers for meshes drive on.",
+        unit="m",
+        gt=0.0,
+        dynamic=False,
+    )
+    layers: tuple[MeshLayerEntry, ...] = parameter(
+        (),
+        "Layers that sensors fill and those that read them, in any order; they may read the layers of the tiles.",
+        dynamic=False,
+    )
+    default_layer: str = parameter(
+        "", "The layer that counts beside that of the profile, the worse of both; empty = the last one.", dynamic=False
+    )
+    update_frequency: float = parameter(
+        10.0, "How often the server updates the map.", unit="Hz", gt=0.0, le=1000.0, dynamic=False
     )
 
 
@@ -92,8 +114,26 @@ class TileServer(MapServer):
         if (frame := config.parameters.global_frame) != tiled.index.frame_id:
             text = f"is in the frame '{tiled.index.frame_id}', the global_frame of the configuration is '{frame}'"
             raise MeshError(str(folder), [text])
-        tiled_map = TiledNavigationMap(tiled, parameters.inscribed_radius, parameters.max_turning_slope)
-        yield ServedMap(tiled_map, self.runtime, "tiled_map", parameters, UPDATE_FREQUENCY)
+        window = self._window(config, parameters, tiled)
+        tiled_map = TiledNavigationMap(tiled, parameters.inscribed_radius, parameters.max_turning_slope, window)
+        yield ServedMap(tiled_map, self.runtime, "tiled_map", parameters, parameters.update_frequency)
+
+    @staticmethod
+    def _window(config: Config, parameters: TiledMapParameters, tiled: TiledMap) -> WindowSettings:
+        layers = config.sections["tiled_map"].layers
+        classes: dict[str, Any] = {layer.type_name: layer.layer_class for layer in layers}
+        try:
+            return window_settings(
+                tiled,
+                parameters.window,
+                parameters.layers,
+                {layer.name: cast(Any, layer.parameters) for layer in layers},
+                parameters.default_layer,
+                parameters.inscribed_radius,
+                classes.__getitem__,
+            )
+        except LayerListError as error:
+            raise LayerListError(f"{config.path}: tiled_map: {error}") from error
 
     def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
         """The radius of the disc that stands for the robot; the map's layers keep theirs."""
@@ -107,6 +147,11 @@ class TileServer(MapServer):
         return MapContext(**vars(base), navigation_map=self.tiled_map, transforms=transforms, scans=self.scans)
 
     def _construct(self, spec: PluginSpec) -> LoadedPlugin[Any]:
+        if issubclass(spec.plugin_class, MeshController) and spec.plugin_class.drives_on_part:
+            on_window: Any = partial(WindowController, spec.plugin_class)
+            loaded = super()._construct(replace(spec, plugin_class=on_window))
+            loaded.spec = spec
+            return loaded
         if issubclass(spec.plugin_class, MeshPlugin):
             raise ServerError("needs the whole mesh in memory, which a map of tiles is not")
         return super()._construct(spec)
@@ -119,7 +164,7 @@ class TileServer(MapServer):
     def map_views(self) -> tuple[str, ...]:
         """Names of the layers, the one of the cost profile first."""
         tiled = self.tiled_map.tiled
-        shown = tiled.index.layers[tiled.index.layer_of(tiled.profile)]
+        shown = tiled.profile_layer
         return tuple(sorted(tiled.index.layers, key=lambda name: name != shown))
 
     def map_view(self, name: str = "") -> GridView:

@@ -5,6 +5,7 @@ It ends where it is cut off. Whoever asks it a question asks for so much that th
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,22 +19,65 @@ from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
 from mbf_mesh_nav.mesh.topology import build_topology
 from mbf_mesh_nav.tiles.index import Box
+from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED, SensedCosts
 from mbf_mesh_nav.tiles.tile import Tile, TileKey
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
+
+SENSED = "sensed"
+"""Name of the layer with the sensed costs on surroundings outside the window."""
 
 
 class StoredLayer(MeshLayer):
     """A layer with the values that the tiles hold."""
+
+    @classmethod
+    def reach(cls, parameters: LayerParameters) -> float:
+        """0: nothing is computed."""
+        return 0.0
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """The values it was given."""
         return self._costs, self._lethal
 
 
+class Surroundings:
+    """A part of a tiled map.
+
+    Attributes
+    ----------
+    map : MeshMap
+    numbers : (V,) int64
+        Numbers of its vertices in the whole map.
+    """
+
+    def __init__(self, mesh_map: MeshMap, numbers: NDArray[np.int64]) -> None:
+        self.map, self.numbers = mesh_map, numbers
+        self._stored, self._shown = mesh_map.layers, mesh_map.default_layer
+        self._sensed = NOTHING_SENSED
+        self._lock = threading.Lock()
+
+    def with_sensed(self, sensed: SensedCosts) -> MeshMap:
+        """The map, from now on with the worse of the stored and the sensed costs; they are its layer "sensed"."""
+        with self._lock:
+            if sensed is not self._sensed:
+                self._lay_over(sensed)
+                self._sensed = sensed
+        return self.map
+
+    def _lay_over(self, sensed: SensedCosts) -> None:
+        stored, factor = self._stored[str(self._shown)], self.map.edge_cost_factor
+        values = sensed.laid_over(self.numbers, stored.costs, stored.lethal)
+        if values is not None:
+            raised = stored_layer(self.map, SENSED, *values)
+            self.map.set_layers(LayerGraph([*self._stored.values(), raised]), SENSED, factor)
+        elif self.map.default_layer != self._shown:
+            self.map.set_layers(self._stored, self._shown, factor)
+
+
 def mesh_within(
     tiled: TiledMap, low: tuple[float, float], high: tuple[float, float], read: Callable[[TileKey], Tile]
-) -> MeshMap | None:
-    """The faces of a map whose bounding boxes in plan view touch a rectangle, as a map; None without any.
+) -> Surroundings | None:
+    """The faces of a map whose bounding boxes in plan view touch a rectangle; None without any.
 
     Where tiles have different values for a vertex that they share, it has the worse ones.
 
@@ -58,7 +102,7 @@ def mesh_within(
         return None
     # 1. One vertex for each number of the whole map.
     numbers = np.concatenate([part.numbers for part in parts])
-    _, first, vertex_of = np.unique(numbers, return_index=True, return_inverse=True)
+    known, first, vertex_of = np.unique(numbers, return_index=True, return_inverse=True)
     vertices: FloatArray = np.concatenate([part.vertices for part in parts])[first]
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     corners = [vertex_of[part.faces + start] for part, start in zip(parts, starts, strict=False)]
@@ -70,7 +114,7 @@ def mesh_within(
         np.concatenate(values, axis=1) for values in zip(*((p.costs, p.lethal) for p in parts), strict=True)
     )
     _put_layers(mesh_map, tiled, *_worst(costs, lethal, vertex_of.astype(np.int32), len(vertices)))
-    return mesh_map
+    return Surroundings(mesh_map, known[mesh_map.internal_to_input])
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +151,13 @@ def _part_of(tile: Tile, low: tuple[float, float], high: tuple[float, float]) ->
     )
 
 
+def stored_layer(mesh_map: MeshMap, name: str, costs: CostArray, lethal: LethalArray) -> StoredLayer:
+    """A layer with given values (V,) in internal numbering."""
+    layer = StoredLayer(LayerContext(name, mesh_map.topology, mesh_map.locator, LayerParameters()))
+    layer.replace(costs, lethal)
+    return layer
+
+
 def _worst(costs: Float32Array, lethal: BoolArray, vertex_of: IntArray, count: int) -> tuple[Float32Array, BoolArray]:
     """The greatest cost and the flags (L, count) of values (L, k) of some vertices, several times for some."""
     worst, flags = np.zeros((len(costs), count), dtype=np.float32), np.zeros((len(costs), count), dtype=np.bool_)
@@ -119,10 +170,8 @@ def _worst(costs: Float32Array, lethal: BoolArray, vertex_of: IntArray, count: i
 def _put_layers(mesh_map: MeshMap, tiled: TiledMap, costs: Float32Array, lethal: BoolArray) -> None:
     """Layers with the values (L, V) in the numbering the mesh was given in, and the profile's as the default one."""
     order = mesh_map.internal_to_input
-    layers = []
-    for row, name in enumerate(tiled.index.layers):
-        layer = StoredLayer(LayerContext(name, mesh_map.topology, mesh_map.locator, LayerParameters()))
-        layer.replace(costs[row][order], lethal[row][order])
-        layers.append(layer)
-    shown = tiled.index.layers[tiled.index.layer_of(tiled.profile)]
-    mesh_map.set_layers(LayerGraph(layers), shown, tiled.profile.edge_cost_factor)
+    layers = [
+        stored_layer(mesh_map, name, costs[row][order], lethal[row][order])
+        for row, name in enumerate(tiled.index.layers)
+    ]
+    mesh_map.set_layers(LayerGraph(layers), tiled.profile_layer, tiled.profile.edge_cost_factor)

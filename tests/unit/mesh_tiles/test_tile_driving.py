@@ -56,6 +56,7 @@ def drive(folder, backend, *goals):
         if backend == "tiles":
             tiled = server.tiled_map.tiled
             assert len(tiled.pool.loaded) <= tiled.pool.slots == 2
+            assert server.tiled_map._window.now.is_central(session.robot.pose.x, session.robot.pose.y)
     return results, stood
 
 
@@ -75,6 +76,23 @@ def test_a_drive_over_three_borders_of_tiles_ends_as_on_the_whole_mesh(folder):
         assert one.distance_to(other) < 0.3
     for result in (ours[3], expected[3]):
         assert "the surface ends" in result.message
+
+
+@pytest.mark.parametrize(("controller", "block"), [("path_follower", ""), ("mppi", "follower: {batch_size: 100}")])
+def test_a_controller_for_meshes_drives_from_window_to_window_as_on_the_whole_mesh(folder, controller, block):
+    """Windows of 12 m move on every 3 m."""
+    path = Path.from_points(np.linspace(START.position, (13.0, 2.4, 0.0), 60))
+    for backend in ("tiles", "mesh"):
+        text = (folder / f"{backend}.yaml").read_text("utf-8").replace("follow_path", controller)
+        text = text.replace("follower: {max_vel_x: 2.0, decel_lim_x: 2.0}", block).replace(
+            "{folder", "{window: 12.0, folder"
+        )
+        (folder / f"{backend}_{controller}.yaml").write_text(text, "utf-8")
+    goals = [ExePathGoal(path), MoveBaseGoal(Pose.planar(20.0, 2.0))]
+    (ours, stood), (expected, stands) = (drive(folder, f"{one}_{controller}", *goals) for one in ("tiles", "mesh"))
+    assert [result.outcome for result in ours] == [0, 0] == [result.outcome for result in expected]
+    for one, other in zip(stood, stands, strict=True):
+        assert one.distance_to(other) < 0.3
 
 
 def test_a_goal_that_needs_more_tiles_than_the_memory_holds_is_not_silently_refused(folder):

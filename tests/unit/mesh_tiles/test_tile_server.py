@@ -26,7 +26,8 @@ from mbf_mesh_nav.planners.hierarchical import HierarchicalPlanner
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.tiles.build import build_tiles
 from mbf_mesh_nav.tiles.serving import surroundings
-from mbf_mesh_nav.tiles.serving.navigation_map import KEPT_VERTICES, TiledNavigationMap
+from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
+from mbf_mesh_nav.tiles.serving.squares import KEPT_VERTICES
 from mbf_mesh_nav.tiles.sources import HeightSource
 from mbf_mesh_nav.tiles.tile import read_tile, tile_file
 from mbf_mesh_nav.tiles.tiled_map import TiledMap, sound_tile
@@ -178,7 +179,7 @@ def test_a_path_over_many_tiles_is_checked_as_on_the_whole_mesh_and_few_surround
 def test_surroundings_that_are_near_each_other_are_cut_out_once(tiled, monkeypatch):
     cut, mesh_within = [], surroundings.mesh_within
     monkeypatch.setattr(
-        "mbf_mesh_nav.tiles.serving.navigation_map.mesh_within", lambda *args: cut.append(args) or mesh_within(*args)
+        "mbf_mesh_nav.tiles.serving.squares.mesh_within", lambda *args: cut.append(args) or mesh_within(*args)
     )
     for x in np.linspace(20.0, 21.0, 20):
         tiled.point_check()(Pose.planar(x, 20.0))
@@ -232,7 +233,8 @@ def test_the_picture_shows_the_highest_cost_of_every_pixel(tiled_hills, whole_hi
         ("  profile: fast\n", "", MeshError, "no cost profile 'fast', the map has: default"),
         ("  memory: 1000\n", "", MeshError, "MB of memory, allowed are 0.001 MB"),
         ("", "global_frame: odom\n", MeshError, "in the frame 'map', the global_frame of the configuration is 'odom'"),
-        ("", "controllers: [{name: mppi, type: mppi}]\n", ServerError, "needs the whole mesh in memory"),
+        ("", "controllers: [{name: field, type: vector_field}]\n", ServerError, "needs the whole mesh in memory"),
+        ("", "refiners: [{name: pull, type: string_pulling}]\n", ServerError, "needs the whole mesh in memory"),
     ],
 )
 def test_what_does_not_fit_the_map_is_refused_at_the_start(tiled_hills, tmp_path, block, more, error, text):
@@ -257,7 +259,8 @@ def test_a_tile_that_is_damaged_while_the_server_runs_is_a_map_error(tiled_hills
 
 
 def cut_out(tiled, low, high):
-    return surroundings.mesh_within(tiled, low, high, lambda key: sound_tile(tiled.folder, tiled.index, key))
+    found = surroundings.mesh_within(tiled, low, high, lambda key: sound_tile(tiled.folder, tiled.index, key))
+    return None if found is None else found.map
 
 
 def test_where_tiles_differ_about_a_shared_vertex_it_has_the_worse_value(tiled_hills, tmp_path):

@@ -20,7 +20,7 @@ from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.planners.hierarchical import HierarchicalPlanner
 from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
 from mbf_mesh_nav.tiles.index import CostProfile, TileEntry, TileIndex
-from mbf_mesh_nav.tiles.serving import navigation_map
+from mbf_mesh_nav.tiles.serving import navigation_map, squares
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
 from mbf_mesh_nav.tiles.serving.recently_used import RecentlyUsed
 from mbf_mesh_nav.tiles.sources import HeightSource, MeshSource
@@ -136,7 +136,7 @@ def test_the_spacing_of_a_wall_is_not_nothing():
 
 # --------------------------------------------------------------------------------------------------- limits
 def test_a_question_that_looks_too_far_is_refused_before_a_tile_is_read(tiled, monkeypatch):
-    monkeypatch.setattr(navigation_map, "mesh_within", None)
+    monkeypatch.setattr(squares, "mesh_within", None)
     assert tiled.reach == pytest.approx(255.0, rel=0.15)
     far = PlaceQuery(safety_dist=5000.0)
     for ask in (
@@ -151,7 +151,7 @@ def test_a_question_that_looks_too_far_is_refused_before_a_tile_is_read(tiled, m
 
 
 def test_as_many_surroundings_are_kept_as_have_so_many_vertices(tiled, monkeypatch):
-    monkeypatch.setattr(navigation_map, "KEPT_VERTICES", 12_000)
+    monkeypatch.setattr(squares, "KEPT_VERTICES", 12_000)
     tiled = TiledNavigationMap(tiled.tiled)
     for x in np.linspace(-40.0, 90.0, 14):
         tiled.point_check()(Pose.planar(x, 20.0))

@@ -1,0 +1,200 @@
+"""The part of a tiled map around the robot, as one mesh map: what sensors see is marked on it, controllers drive on it.
+
+It is cut out like any surroundings. The layers of the configuration are computed on it, with the stored ones as inputs.
+A window never moves: when the robot comes near its edge a new one is cut out around it, whose layers take over what
+lies on both. What lies off the new one is forgotten, so memory is bounded by the side of the window.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mbf_abstract.event_values import error_text
+from mbf_abstract.geometry import Pose
+from mbf_mesh_nav.map.layer import LayerContext, LayerParameters, MeshLayer
+from mbf_mesh_nav.map.layer_graph import LayerGraph
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED, SensedCosts
+from mbf_mesh_nav.tiles.serving.squares import BEYOND, Squares
+from mbf_mesh_nav.tiles.serving.surroundings import StoredLayer, Surroundings, stored_layer
+from mbf_mesh_nav.tiles.serving.window_settings import MOVES_AT, SHOWN, WindowSettings
+from mbf_mesh_nav.tiles.tiled_map import TiledMap
+
+
+class Window:
+    """One window.
+
+    Parameters
+    ----------
+    around : Surroundings
+        What was cut out.
+    middle : (x, y)
+        [m]
+    profile_layer : str
+        The stored layer that plans are made with.
+    old : Window, optional
+        The one before, whose layers hand on what they have sensed.
+
+    Attributes
+    ----------
+    map : MeshMap
+        With the layers of the configuration.
+    middle : (x, y)
+        [m]
+
+    Raises
+    ------
+    Exception
+        What a layer raises.
+    """
+
+    def __init__(
+        self,
+        around: Surroundings,
+        middle: tuple[float, float],
+        settings: WindowSettings,
+        profile_layer: str,
+        old: Window | None = None,
+    ) -> None:
+        self.map: MeshMap = around.map
+        self._numbers, self.middle, self._side = around.numbers, middle, settings.side
+        self._stored = around.map.layers[profile_layer]
+        self._last: tuple[int, SensedCosts] = (-1, NOTHING_SENSED)  # version of the snapshot
+        if settings.planned:
+            layers = self._layers(settings, around.map, old)
+            self.map.set_layers(LayerGraph(layers), SHOWN, around.map.edge_cost_factor)
+
+    def _layers(self, settings: WindowSettings, mesh_map: MeshMap, old: Window | None) -> list[MeshLayer]:
+        layers: dict[str, MeshLayer] = {}
+        for one in settings.planned:
+            name = one.entry.name
+            if one.layer_class is StoredLayer:
+                values = mesh_map.layers[name] if name in mesh_map.layers else self._stored
+                layers[name] = stored_layer(mesh_map, name, values.costs, values.lethal)
+                continue
+            before = old.map.layers[name] if old is not None else None
+            parameters: Any = one.parameters if before is None else before.parameters
+            inputs = tuple(layers[read] for read in one.entry.reads)
+            context = LayerContext(name, mesh_map.topology, mesh_map.locator, parameters, inputs, mesh_map.frame_id)
+            layers[name] = one.layer_class(context)
+            if before is not None:
+                layers[name].take_over(before)
+            layers[name].recompute()
+        return list(layers.values())
+
+    def holds(self, x: float, y: float, radius: float) -> bool:
+        """Whether a disc [m] lies in the window."""
+        return self._distance(x, y) + radius <= 0.5 * self._side
+
+    def is_central(self, x: float, y: float) -> bool:
+        """Whether a robot at a place [m] needs no other window yet."""
+        return self._distance(x, y) <= MOVES_AT * self._side
+
+    def _distance(self, x: float, y: float) -> float:
+        return max(abs(x - self.middle[0]), abs(y - self.middle[1]))
+
+    def sensed(self) -> SensedCosts:
+        """Where the map is worse than what is stored; the same value as long as it is the same."""
+        snapshot, (version, last) = self.map.snapshot(), self._last
+        if snapshot.version == version:
+            return last
+        raised = (snapshot.costs > self._stored.costs) | (snapshot.lethal & ~self._stored.lethal)
+        where = np.flatnonzero(raised)
+        values = self._numbers[where], snapshot.costs[where], snapshot.lethal[where]
+        found = SensedCosts.at(*values, self.map.vertices[where])
+        self._last = snapshot.version, last if found.is_same(last) else found
+        return self._last[1]
+
+
+class FollowingWindow:
+    """The window that is around the robot at this time; for any number of threads.
+
+    Parameters
+    ----------
+    squares : Squares
+        What windows are cut out with.
+
+    Attributes
+    ----------
+    now : Window
+        Until the robot's pose is known it lies anywhere on the surface.
+
+    Raises
+    ------
+    MeshError
+        A tile is damaged.
+    """
+
+    def __init__(self, tiled: TiledMap, squares: Squares, settings: WindowSettings) -> None:
+        self._tiled, self._squares, self._settings = tiled, squares, settings
+        self._problem = ""
+        self._updating = threading.RLock()
+        x, y, _ = squares.tile(tiled.index.tiles[0].key).vertices[0].tolist()
+        first = self._opened(x, y, None)
+        assert first is not None, "a vertex of a tile lies on the surface"
+        self.now = first
+
+    @property
+    def senses(self) -> bool:
+        """Whether any layer of it does."""
+        return bool(self._settings.live)
+
+    def update(self, robot: Pose | None, now: float) -> None:
+        """Take in what sensors have seen up to ``now`` [s], on another window if the robot is too near the edge.
+
+        Raises
+        ------
+        MeshError
+            A tile is damaged; the window stays, and is stale.
+        Exception
+            What a layer raises, likewise.
+        """
+        with self._updating:
+            window = self.now if robot is None else self._around(robot)
+            try:
+                window.map.update(None, now)
+            finally:
+                self.now = window
+
+    def stale_reason(self, now: float) -> str:
+        """Why it is not current at ``now`` [s]: not around the robot, a layer that raised, a silent sensor."""
+        return self._problem or self.now.map.stale_reason(now)
+
+    def cleared(self, clear: Callable[[MeshMap], list[str]]) -> list[str]:
+        """What a function returns that clears layers; not while an update runs."""
+        with self._updating:
+            return clear(self.now.map)
+
+    def set_layer_parameters(self, name: str, parameters: LayerParameters) -> None:
+        """Give a layer of the configuration its parameters; ValueError for those of the tiles."""
+        if name not in self._settings.live:
+            raise ValueError(f"the layer {name!r} has the values of the tiles, no parameter of it can change")
+        with self._updating:
+            self.now.map.set_layer_parameters(name, parameters)
+
+    def renew(self) -> None:
+        """Cut it out again where it is, because the tiles have changed; raises as ``update``."""
+        with self._updating:
+            self.now = self._opened(*self.now.middle, self.now) or self.now
+
+    def _around(self, robot: Pose) -> Window:
+        if self.now.is_central(robot.x, robot.y):
+            self._problem = ""
+            return self.now
+        try:
+            moved = self._opened(robot.x, robot.y, self.now)
+        except BaseException as error:
+            self._problem = f"the window around the robot cannot be made: {error_text(error)}"
+            raise
+        self._problem = ""
+        return moved or self.now  # a robot off the surface
+
+    def _opened(self, x: float, y: float, old: Window | None) -> Window | None:
+        """A window around a place [m]; None where there is no surface."""
+        half = 0.5 * self._settings.side + BEYOND * self._tiled.index.spacing
+        found = self._squares.within((x - half, y - half), (x + half, y + half))
+        return None if found is None else Window(found, (x, y), self._settings, self._tiled.profile_layer, old)

@@ -1,0 +1,97 @@
+"""A controller for one mesh, driven on the window around the robot.
+
+A mesh controller is bound to one map. When the window has moved, the next call makes a new instance on the new one,
+with the same parameters and random numbers, and gives it what is left of the path. Controllers with a memory of past
+commands, such as ``mppi``, begin anew there, as they do with every new plan.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult, PlannedMotion
+from mbf_mesh_nav.plugins import MeshContext, MeshController
+from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
+
+
+class WindowController(AbstractController):
+    """Hands everything to a controller on the present window.
+
+    Parameters
+    ----------
+    controller_class : type
+    context : MapContext
+        With a map of tiles that has a window.
+    """
+
+    def __init__(self, controller_class: type[MeshController], context: MapContext[TiledNavigationMap]) -> None:
+        super().__init__(context)
+        self._class, self._context, self._map = controller_class, context, context.navigation_map
+        self._tracker: PathTracker | None = None
+        self._inner = self._made()
+        self.modelled_compute_time = self._inner.modelled_compute_time
+
+    @property
+    def turns_on_the_spot(self) -> bool:
+        """As the controller."""
+        return self._inner.turns_on_the_spot
+
+    def set_plan(self, path: Path) -> bool:
+        """Take over a path, which may lead out of the window."""
+        self._tracker = None
+        accepted = self._on_window().set_plan(path)
+        if accepted:
+            self._tracker = PathTracker(path)
+        return accepted
+
+    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+        """One cycle of the controller on the present window."""
+        self._follow(request.pose)
+        return self._on_window().compute_velocity_commands(request)
+
+    def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
+        """As the controller."""
+        self._follow(pose)
+        return self._on_window().is_goal_reached(pose, dist_tolerance, angle_tolerance)
+
+    def cancel(self) -> bool:
+        """As the controller."""
+        return self._inner.cancel()
+
+    def planned_motion(self) -> PlannedMotion | None:
+        """As the controller."""
+        return self._inner.planned_motion()
+
+    def parameters_changed(self) -> None:
+        """Hand them on."""
+        self._inner.parameters = self.parameters
+        self._inner.parameters_changed()
+
+    def _follow(self, pose: Pose) -> None:
+        if self._tracker is not None:
+            self._tracker.update(pose.position)
+
+    def _on_window(self) -> MeshController:
+        """The controller on the window of now."""
+        if self._inner.mesh_map is not self._map.window_map:
+            self._inner = self._made()
+            if self._tracker is not None:
+                self._inner.set_plan(_left(self._tracker))
+        return self._inner
+
+    def _made(self) -> MeshController:
+        given: dict[str, Any] = {field.name: getattr(self._context, field.name) for field in fields(self._context)}
+        given.update(navigation_map=self._map.window_map, maps={}, parameters=self.parameters)
+        return self._class(MeshContext(**given))
+
+
+def _left(tracker: PathTracker) -> Path:
+    """The path from the last pose that the robot has passed."""
+    passed = int(np.searchsorted(tracker.lengths, tracker.progress, side="right")) - 1
+    return tracker.path[max(min(passed, len(tracker.path) - 2), 0) :]

@@ -1,0 +1,117 @@
+"""The layers of a window around the robot: those of the configuration, which sense, over those of the tiles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mbf_abstract.maps.layers.layer_list import LayerListError, PlannedLayer, layer_loader
+from mbf_mesh_nav.layers.combinations.max_combination import MaxCombinationLayer
+from mbf_mesh_nav.map.layer import MeshLayer
+from mbf_mesh_nav.map.map_builder import LayerLoader, MeshLayerEntry, MeshMapParameters, plan_mesh_layers
+from mbf_mesh_nav.tiles.build import reach_of
+from mbf_mesh_nav.tiles.serving.surroundings import StoredLayer
+from mbf_mesh_nav.tiles.tiled_map import TiledMap
+
+SHOWN = "shown"
+"""Name of the layer that planners and controllers see: the worse of the profile's layer and the default layer."""
+AS_BUILT = "{} as built"
+"""Name of the profile's layer if a layer of the configuration has its name."""
+STORED = "stored"
+OWN_TYPES: dict[str, type[MeshLayer]] = {STORED: StoredLayer, "max_combination": MaxCombinationLayer}
+MOVES_AT = 0.25
+"""Share of its side that the robot may be away from the middle of a window, along x or y."""
+
+
+@dataclass(frozen=True, eq=False)
+class WindowSettings:
+    """How windows are made.
+
+    Attributes
+    ----------
+    side : float
+        [m]
+    planned : tuple of PlannedLayer
+        All layers of a window, inputs first; empty = the stored ones only.
+    live : frozenset of str
+        Names of those that the configuration lists.
+    """
+
+    side: float
+    planned: tuple[PlannedLayer[MeshLayer], ...] = ()
+    live: frozenset[str] = frozenset()
+
+
+def window_settings(
+    tiled: TiledMap,
+    side: float,
+    entries: Sequence[MeshLayerEntry] = (),
+    blocks: Mapping[str, Any] | None = None,
+    default_layer: str = "",
+    inscribed_radius: float = 0.0,
+    load_layer: LayerLoader | None = None,
+) -> WindowSettings:
+    """Check the layers of a configuration against those of the tiles.
+
+    Parameters
+    ----------
+    side : float
+        [m]
+    entries, blocks
+        The layers that sense, and those that read them, and their parameters by name. One with the name of a stored
+        layer takes its place.
+    default_layer : str
+        The layer that counts beside that of the map's profile; empty = the last one of ``entries``.
+
+    Raises
+    ------
+    LayerListError
+        With all findings.
+    """
+    if not entries:
+        return WindowSettings(side)
+    live = frozenset(entry.name for entry in entries)
+    profile_layer = tiled.profile_layer
+    built = AS_BUILT.format(profile_layer) if profile_layer in live else profile_layer
+    kept = [name for name in tiled.index.layers if name not in live]
+    stored = [MeshLayerEntry(name=name, type=STORED) for name in dict.fromkeys([*kept, built])]
+    default = default_layer or entries[-1].name
+    shown = MeshLayerEntry(name=SHOWN, type="max_combination", inputs=(built, default))
+    load = load_layer or layer_loader("mesh", MeshLayer)
+    parameters = MeshMapParameters(
+        layers=(*stored, *entries, shown), default_layer=default, inscribed_radius=inscribed_radius
+    )
+    plan = plan_mesh_layers(parameters, blocks or {}, lambda name: OWN_TYPES.get(name) or load(name))
+    findings = [*_senseless(plan, live), *_too_wide(plan, side)]
+    if default not in live:
+        findings.append(f"default_layer {default!r}: expected one of the listed layers, {', '.join(sorted(live))}")
+    if findings:
+        raise LayerListError("; ".join(findings))
+    return WindowSettings(side, tuple(plan), live)
+
+
+def _senseless(plan: Sequence[PlannedLayer[MeshLayer]], live: frozenset[str]) -> list[str]:
+    """Findings about layers that neither sense nor read one that does."""
+    sensing: set[str] = set()
+    for planned in plan:  # inputs first
+        senses = planned.layer_class.insert_scan is not MeshLayer.insert_scan
+        if senses or not sensing.isdisjoint(planned.entry.reads):
+            sensing.add(planned.entry.name)
+    return [
+        f"layer {name!r} takes no scans and reads no layer that does, so its values are those of the tiles: build them "
+        "with it and leave it out here"
+        for name in (planned.entry.name for planned in plan)
+        if name in live and name not in sensing
+    ]
+
+
+def _too_wide(plan: Sequence[PlannedLayer[MeshLayer]], side: float) -> list[str]:
+    """A finding if layers look farther than the robot comes to the edge of a window."""
+    reach, room = reach_of(list(plan)), MOVES_AT * side
+    if reach < room:
+        return []
+    return [
+        f"the layers look {reach:g} m around a vertex, a window of {side:g} m leaves {room:g} m around the robot: "
+        f"expected a window of more than {reach / MOVES_AT:g} m"
+    ]
