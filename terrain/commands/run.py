@@ -1,4 +1,4 @@
-"""The commands ``mbf run``, ``scenarios`` and ``replay``; ``rerun`` and ``compare`` are in modules of their own."""
+"""The command ``mbf run``, and the registration of those around it, each in a module of its own."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ from terrain.commands.command_line import command_line
 from terrain.commands.compare import compare
 from terrain.commands.completion import SCENARIO
 from terrain.commands.new_run import RUNS, new_run_folder
+from terrain.commands.replay import open_replay, replay, replay_page
 from terrain.commands.rerun import rerun
+from terrain.commands.scenarios import scenarios
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -108,22 +110,12 @@ def run(
         refuse_without(context, "--foxglove", *NAMES)
     if not ros2:
         refuse_without(context, "--ros2", "ros2_stamped", "ros2_lockstep", "ros2_patience")
+    folder = out or new_run_folder(RUNS, datetime.now())
     with readable_errors():
-        from mbf_abstract.access.foxglove import FoxgloveOptions
-        from mbf_abstract.config.findings import ConfigError
-        from mbf_abstract.server.plugin_host import ServerError
         from terrain.commands.live_line import LiveLine
-        from terrain.commands.watching import watched
-        from terrain.scenarios.on_map import on_map
-        from terrain.scenarios.scenario import load_scenario, scenario_file
-        from terrain.session.runner import RunOptions, run_scenario
-        from terrain.viewer.live.session import ViewOptions
+        from terrain.session.runner import RunOptions
         from terrain.viewer.results import write_joint_results, write_results
 
-        def on_other_map(loaded: Scenario) -> Scenario:
-            return loaded if map_file is None else on_map(loaded, map_file)
-
-        folder = out or new_run_folder(RUNS, datetime.now())
         with LiveLine(show=not (quiet or as_json)) as live:
             options = RunOptions(
                 folder=folder,
@@ -140,25 +132,45 @@ def run(
                 write_joint_views=partial(write_joint_results, on_step=live.step),
             )
             if view or foxglove:
+                from mbf_abstract.access.foxglove import FoxgloveOptions
+                from terrain.commands.watching import watched
+                from terrain.viewer.live.session import ViewOptions
+
                 page = ViewOptions(view_host, view_port, view_speed, view_token, view_read_only)
                 app = FoxgloveOptions.given(foxglove, foxglove_at, foxglove_token, foxglove_read_only, foxglove_origin)
                 options = watched(replace(options, stay=stay), page if view else None, app, view_speed, live)
             if ros2:
-                from terrain.commands.robot_on_ros import driven_over_ros, require_one_robot
+                from terrain.commands.robot_on_ros import driven_over_ros
 
                 options = driven_over_ros(options, ros2_stamped, ros2_lockstep, ros2_patience)
-            try:
-                loaded = load_scenario(scenario)
-                if ros2:
-                    require_one_robot(loaded, scenario_file(scenario))
-                result = run_scenario(on_other_map(loaded), options)
-            except (ConfigError, ServerError) as error:
-                raise _all_that_is_wrong(error, scenario, options, on_other_map) from error
+            result = _driven(scenario, map_file, options, over_ros=ros2)
     _print_result(result, as_json)
     if show:
-        _open_replay(folder)
+        open_replay(folder)
     if not result.success:
         raise typer.Exit(FAILURE)
+
+
+def _driven(scenario: str, map_file: Path | None, options: RunOptions, over_ros: bool) -> RunResult:
+    """Drive a scenario, on another map if one is given; raises all that is wrong with it where it cannot begin."""
+    from mbf_abstract.config.findings import ConfigError
+    from mbf_abstract.server.plugin_host import ServerError
+    from terrain.scenarios.on_map import on_map
+    from terrain.scenarios.scenario import load_scenario, scenario_file
+    from terrain.session.runner import run_scenario
+
+    def on_other_map(loaded: Scenario) -> Scenario:
+        return loaded if map_file is None else on_map(loaded, map_file)
+
+    try:
+        loaded = load_scenario(scenario)
+        if over_ros:
+            from terrain.commands.robot_on_ros import require_one_robot
+
+            require_one_robot(loaded, scenario_file(scenario))
+        return run_scenario(on_other_map(loaded), options)
+    except (ConfigError, ServerError) as error:
+        raise _all_that_is_wrong(error, scenario, options, on_other_map) from error
 
 
 def _all_that_is_wrong(
@@ -177,79 +189,6 @@ def _all_that_is_wrong(
     chosen = backend if isinstance(backend, str) else None
     findings = check_scenario(document, chosen, options.seed, options.settings, change=change).findings
     return ConfigError(findings) if findings else error
-
-
-def _open_replay(folder: Path) -> None:
-    page = _replay_page(folder)
-    if page is not None:
-        typer.launch(page.as_uri())
-
-
-def _replay_page(folder: Path) -> Path | None:
-    """Return the absolute path of the replay of a run, if there is one."""
-    page = (folder / "replay.html").resolve()
-    return page if page.is_file() else None
-
-
-def scenarios(
-    copy: str = typer.Option("", "--copy", metavar="NAME", help="Copy this scenario with its configurations."),
-    to: Path = typer.Option(Path(), "--to", help="With --copy: the folder to copy to."),
-) -> None:
-    """List the scenarios that come with the package, and what each of them proves."""
-    with readable_errors():
-        from terrain.scenarios.library import shipped_scenarios
-        from terrain.scenarios.scenario import copy_scenario, load_scenario
-
-        if copy:
-            for file in copy_scenario(copy, to):
-                typer.echo(file)
-            return
-        for name in shipped_scenarios():
-            loaded = load_scenario(name)
-            typer.echo(f"{name:16} {loaded.proves}  [{', '.join(loaded.navigation)}]")
-
-
-def replay(
-    folder: Path = typer.Argument(..., help="Folder of a run, e.g. runs/2030-01-02_03-04-05."),
-    show: bool = typer.Option(True, "--open/--no-open", help="Open the page in the browser."),
-    rrd: bool = typer.Option(False, "--rrd", help="Write run.rrd for Rerun too; needs the extra rerun."),
-    gif: bool = typer.Option(False, "--gif", help="Write animation.gif too, for where no script may run."),
-    mp4: bool = typer.Option(False, "--mp4", help="Write film.mp4 too, in full colour; needs the extra video."),
-) -> None:
-    """Write picture, report, replay and MCAP log of a run, also of one that was killed, and open the replay."""
-    with readable_errors():
-        from terrain.commands.live_line import LiveLine
-        from terrain.recording.fleet_metrics import judge_together
-        from terrain.recording.run_folder import read_run, robots_of
-        from terrain.viewer.logs.rerun_log import write_rrd
-        from terrain.viewer.pictures.animation import write_animation
-        from terrain.viewer.pictures.film import write_film
-        from terrain.viewer.results import write_joint_results, write_results
-
-        recordings = {}
-        with LiveLine() as live:
-            problems = []
-            for name in robots_of(folder):
-                own = folder / name
-                recordings[name], metrics = read_run(own)
-                problems += write_results(own, recordings[name], metrics, live.step)
-                if rrd:
-                    live.step("writing the recording for Rerun")
-                    write_rrd(own / "run.rrd", recordings[name])
-                if gif:
-                    live.step("writing the animation")
-                    write_animation(own / "animation.gif", recordings[name])
-                if mp4:
-                    live.step("writing the film")
-                    write_film(own / "film.mp4", recordings[name])
-            if "" not in recordings:
-                verdict = judge_together({name: recording.verdict for name, recording in recordings.items()})
-                problems += write_joint_results(folder, recordings, verdict, live.step)
-            if problems:
-                raise RuntimeError("; ".join(dict.fromkeys(problems)))
-    typer.echo((folder / "replay.html").resolve())
-    if show:
-        _open_replay(folder)
 
 
 def settings_of(texts: list[str], **chosen: str) -> dict[str, str]:
@@ -284,6 +223,6 @@ def _print_result(result: RunResult, as_json: bool) -> None:
         typer.echo(f"results in {result.folder}: replay.html, picture.png, metrics.json, and a folder for each robot")
     else:
         typer.echo(f"results in {result.folder}: replay.html, report.html, picture.png, run.mcap, metrics.json")
-    page = _replay_page(result.folder)
+    page = replay_page(result.folder)
     if page is not None:
         typer.echo(f"replay: {page.as_uri()}")
