@@ -1,0 +1,73 @@
+"""A robot without ROS: a driver in plain Python, here for a base that speaks JSON over UDP.
+
+The base sends where it is and how it moves, ten times a second or more, and takes speed and yaw rate::
+
+    {"x": 1.0, "y": 2.0, "yaw": 0.5, "v": 0.3, "w": 0.0}        {"v": 0.3, "w": 0.0}
+
+It must stop by itself when nothing has come for half a second. To go to (4, 2)::
+
+    python examples/udp_driver.py my_robot.yaml 10.0.0.5:7000 4.0 2.0
+"""
+
+import json
+import socket
+import sys
+import threading
+
+from mbf_abstract.drive.robot import Odometry
+from mbf_abstract.geometry import Command, Pose, Twist
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.navigator import Navigator
+from mbf_abstract.time.clock import WallClock
+
+FIRST_WORD = 10.0  # s to wait for the base
+
+
+class UdpRobot:
+    """The driver: ``send_command`` and ``odometry`` only pass on what is there, and never wait."""
+
+    def __init__(self, base: tuple[str, int], clock: WallClock, transforms: TransformBuffer) -> None:
+        self.heard = threading.Event()
+        self._base, self._clock, self._transforms = base, clock, transforms
+        self._odometry: Odometry | None = None
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.send_command(Twist())  # the base learns where to send to
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def send_command(self, command: Command) -> None:
+        """Send a command to the base; what cannot be sent is the gate's to try again."""
+        assert isinstance(command, Twist)
+        self._socket.sendto(json.dumps({"v": command.vx, "w": command.wz}).encode(), self._base)
+
+    def odometry(self) -> Odometry | None:
+        """Return what came last; the navigator sees by its stamp when nothing comes any more."""
+        return self._odometry
+
+    def _listen(self) -> None:
+        while True:
+            state, now = json.loads(self._socket.recv(2000)), self._clock.now()
+            pose = Pose.planar(state["x"], state["y"], state["yaw"])
+            self._transforms.set(Transform.from_pose(pose.stamped(now), "base_link"))
+            self._odometry = Odometry(Twist.planar(state["v"], wz=state["w"]), now)
+            self.heard.set()
+
+
+def main(config: str, base: str, x: float, y: float) -> bool:
+    host, _, port = base.rpartition(":")
+    clock, transforms = WallClock(), TransformBuffer()
+    robot = UdpRobot((host, int(port)), clock, transforms)
+    if not robot.heard.wait(FIRST_WORD):
+        print(f"{base} is silent")
+        return False
+    with Navigator.from_file(config, robot, clock, transforms) as navigator:  # the robot stops at the end of the block
+        navigator.server.warm_up(navigator.robot_pose(), navigator.ground_pose(x, y))
+        result = navigator.go_to(navigator.ground_pose(x, y))
+        print(f"{result.outcome_name}: {result.message}")
+        return result.success
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 5:
+        sys.exit(__doc__)
+    sys.exit(0 if main(sys.argv[1], sys.argv[2], float(sys.argv[3]), float(sys.argv[4])) else 1)
