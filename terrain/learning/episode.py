@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from enum import Enum
 from typing import cast
 
+from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.tilt import tilt_of
@@ -76,7 +78,7 @@ class Episode:
 
     def _begin(self, observed: ObservationParameters) -> None:
         session, server = self.session, cast(MapServer, self.session.navigator.server)
-        if observed.scan_sectors and not session.sensor_mounts:
+        if observed.scan_sectors and not session.scenario.sensors:
             raise ValueError(f"scan_sectors: expected 0 in {session.scenario.name!r}, which has no lidar")
         runtime = self._runtime = server.runtime
         if self._control_period > runtime.gate.command_timeout:
@@ -90,6 +92,7 @@ class Episode:
         self._is_at_last_goal = False
         self._seen_track, self._max_tilt = 0, 0.0
         session.run()
+        self._known = runtime.robot.pose(), runtime.robot.velocity()
         lease = runtime.gate.acquire(OWNER)
         assert lease is not None, "nobody else drives in an episode"
         self._lease = lease
@@ -135,8 +138,14 @@ class Episode:
 
     def observe(self) -> Observation:
         """Return the present observation."""
+        return self._observer.observe(*self._state())
+
+    def _state(self) -> tuple[Pose, Twist]:
+        """Estimated pose and measured velocity; the last known ones where the localisation has fallen silent."""
         robot = self._runtime.robot
-        return self._observer.observe(robot.pose(), robot.velocity())
+        with suppress(RobotStateError):
+            self._known = robot.pose(), robot.velocity()
+        return self._known
 
     def close(self) -> None:
         """Stop the robot and free the world; idempotent."""
@@ -167,7 +176,7 @@ class Episode:
     def _take_arrival(self) -> None:
         """Go on to the next goal once the robot is at one by its estimated pose, as navigation decides it."""
         parameters, goal = self._runtime.parameters, self._goals[0]
-        pose = self._runtime.robot.pose()
+        pose, _ = self._state()
         distance, angle = pose.distance_to(goal), abs(normalize_angle(pose.yaw - goal.yaw))
         if distance >= parameters.dist_tolerance or angle >= parameters.angle_tolerance:
             return

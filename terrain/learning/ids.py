@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import gymnasium
 
-from terrain.scenarios.scenario import shipped_scenarios
+from terrain.scenarios.library import shipped_scenarios
 
 SEVERAL_ROBOTS = frozenset({"two_couriers"})
 ENVIRONMENT = "terrain.learning.environment"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from mbf_abstract.config.findings import ConfigError, Finding
 from terrain.experiments.evaluation import indoor, outdoor
 from terrain.scenarios.scenario import Scenario, load_scenario
 
@@ -21,9 +22,11 @@ def one_world(scenario: Scenario | str) -> Worlds:
     Raises
     ------
     ConfigError
-        There is no such scenario, or the file is wrong; all findings.
+        There is no such scenario, it has several robots, or the file is wrong; all findings.
     """
     loaded = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    if loaded.robots:
+        raise ConfigError([Finding(loaded.name, 1, "robots", "one robot, for an environment", "several")])
     return lambda seed: (loaded, seed)
 
 

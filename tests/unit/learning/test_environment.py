@@ -7,6 +7,7 @@ import pytest
 
 from mbf_abstract.config.findings import ConfigError
 from terrain.experiments.evaluation.outdoor import CONFIGS as OUTDOOR
+from terrain.scenarios.faults import SensorFault
 from terrain.scenarios.limits import Limits
 from terrain.scenarios.scenario import PlanarPose
 from terrain.scenarios.world_types import GeneratedWorld
@@ -116,7 +117,8 @@ def test_vectorised_environments_drive_as_single_ones(make_environment):
 
 def test_every_shipped_scenario_with_one_robot_has_an_id():
     from terrain.learning import ids
-    from terrain.scenarios.scenario import load_scenario, shipped_scenarios
+    from terrain.scenarios.library import shipped_scenarios
+    from terrain.scenarios.scenario import load_scenario
 
     single = {name for name in shipped_scenarios() if not load_scenario(name).robots}
     assert single == shipped_scenarios().keys() - ids.SEVERAL_ROBOTS
@@ -156,6 +158,21 @@ def test_what_a_scenario_cannot_give_is_refused_when_its_world_is_built(
         make_environment(small_room(**changes), **arguments).reset(seed=0)
 
 
+@pytest.mark.parametrize("sensor", ["lidar", "localization"])
+def test_a_sensor_that_falls_silent_leaves_its_last_value_and_the_episode_goes_on(
+    make_environment, drive, small_room, sensor
+):
+    silent = SensorFault(type="silent", sensor=sensor, start=1.0)
+    environment = make_environment(small_room(faults=(silent,), time_limit=5.5))
+    _, steps = drive(environment, lambda seen: [0.2, 0.0], seed=3)
+    part = {"lidar": "scan", "localization": "goal"}[sensor]
+    assert steps[-1][4]["ending"] == "time"
+    if sensor == "localization":
+        assert np.array_equal(steps[10][0][part], steps[-1][0][part])
+    else:  # the points stay where they are, the robot passes them
+        assert steps[-1][0][part][0] == pytest.approx(steps[10][0][part][0] + 0.4, abs=0.1)
+
+
 def test_hills_in_bullet_are_driven_on_with_heights_and_without_a_lidar(make_environment, small_room):
     ground = GeneratedWorld(type="generated", size=(8.0, 8.0), spacing=0.25, median_slope=6.0)
     at = {"start": PlanarPose(x=2.0, y=2.0, yaw=0.0), "goals": (PlanarPose(x=6.0, y=6.0, yaw=0.0),)}
@@ -189,3 +206,5 @@ def test_misuse_is_refused(make_environment):
         environment.step([np.nan, 0.0])
     with pytest.raises(ConfigError, match="no_such_scenario"):
         make_environment("no_such_scenario")
+    with pytest.raises(ConfigError, match="one robot, for an environment"):
+        make_environment("two_couriers")

@@ -1,0 +1,77 @@
+"""The example: its policy is symmetric, its training is resumable, and its weights drive."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+FOLDER = Path(__file__).resolve().parents[3] / "examples" / "learned_controller"
+MODULES = ("policy", "train", "weights")
+
+
+@pytest.fixture(scope="module")
+def example():
+    """The modules of the example, imported as in its folder."""
+    pytest.importorskip("gymnasium", reason="needs the extra gym")
+    sys.path.insert(0, str(FOLDER))
+    try:
+        import policy
+        import train
+        import weights
+
+        yield policy, train, weights
+    finally:
+        sys.path.remove(str(FOLDER))
+        for name in MODULES:
+            sys.modules.pop(name, None)
+
+
+values = st.floats(-2.0, 2.0)
+scans = st.lists(st.floats(0.0, 2.0), min_size=24, max_size=24)
+plans = st.lists(st.tuples(values, values), min_size=4, max_size=4)
+
+
+@given(scan=scans, plan=plans, speed=values, turning=values, seed=st.integers(0, 99))
+def test_a_mirrored_world_gives_the_mirrored_command(example, scan, plan, speed, turning, seed):
+    policy, _, _ = example
+    weights = np.random.default_rng(seed).normal(size=policy.SIZE)
+    mirrored_plan = np.array(plan) * [1.0, -1.0]
+    ahead, turn = policy.action(
+        weights, {"scan": np.array(scan), "waypoints": np.array(plan), "velocity": np.array([speed, 0.0, turning])}
+    )
+    mirrored = {"scan": np.array(scan[::-1]), "waypoints": mirrored_plan, "velocity": np.array([speed, 0.0, -turning])}
+    assert policy.action(weights, mirrored) == pytest.approx([ahead, -turn], abs=1e-9)
+
+
+def test_a_training_that_was_stopped_ends_with_the_same_numbers(example, tmp_path, monkeypatch):
+    _, train, _ = example
+    monkeypatch.setattr(train, "STATE", tmp_path / "training.json")
+    monkeypatch.setattr(train, "WEIGHTS", tmp_path / "weights.py")
+
+    def drive_all(jobs):
+        return [float(-np.square(weights - 0.3).sum() - room % 7) for weights, room in jobs]
+
+    _, mean, spread = train.read_state()
+    for number in range(4):
+        mean, spread = train.generation(number, mean, spread, drive_all)[:2]
+    for _ in range(4):
+        done, stopped, width = train.read_state()
+        train.write_state(done + 1, *train.generation(done, stopped, width, drive_all)[:2])
+    done, stopped, _ = train.read_state()
+    assert done == 4 and stopped.tolist() == mean.tolist()
+    assert np.square(mean - 0.3).sum() < np.square(train.start() - 0.3).sum()
+    assert str(mean[0]) in (tmp_path / "weights.py").read_text()
+
+
+def test_the_shipped_weights_drive_through_a_room_that_they_were_not_trained_in(example, drive):
+    policy, train, weights = example
+    assert len(weights.WEIGHTS) == policy.SIZE
+    environment = train.of_bench_indoor([0], observation=policy.OBSERVED, commands=policy.COMMANDS)
+    try:
+        _, steps = drive(environment, lambda seen: policy.action(weights.WEIGHTS, seen), seed=0)
+        assert steps[-1][4]["success"], steps[-1][4]["verdict"]
+    finally:
+        environment.close()
