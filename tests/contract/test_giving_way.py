@@ -386,21 +386,27 @@ def test_a_robot_that_waits_pulls_out_as_soon_as_the_other_one_cannot_yield(give
 
 
 class PullingOut(Radio):
-    """The other robot stands beside the way from 2 s on."""
+    """Ben stands beside the way from 2 s on."""
 
     def anew(self, one):
-        off = (0.0, 2.0, 0.0) if self.clock.now() > 2.0 else (0.0, 0.0, 0.0)
+        off = (0.0, 2.0, 0.0) if one.name == "ben" and self.clock.now() > 2.0 else (0.0, 0.0, 0.0)
         return replace(super().anew(one), way=one.way[:1] + off)
 
 
-@pytest.mark.parametrize(("channel", "leaves"), [(PullingOut, True), (Radio, False)], ids=["leaves", "stays"])
-def test_the_map_keeps_only_robots_that_still_stand_where_they_met(give_way, world, channel, leaves):
-    """No ray passes the cells that the other one was seen on: it stands still beside the way, and nothing is sensed."""
+@pytest.mark.parametrize(
+    ("channel", "parked_at", "is_forgotten"),
+    [(PullingOut, 7.0, True), (PullingOut, 5.4, False), (Radio, 7.0, False)],
+    ids=["ben leaves", "ben leaves, another one is there", "ben stays"],
+)
+def test_the_maps_forget_where_robots_met_that_have_left(give_way, world, channel, parked_at, is_forgotten):
+    """No ray passes the cells on which one was seen: nothing is sensed anew. What stands beside it is kept."""
     seen = world.sensing()
     world.see(seen, (5.3, 3.0), (5.2, 3.9))
-    result, _ = give_way(hall, traffic=head_on(9.0, channel(until=100.0)), navigation_map=seen, longest_wait=4.0)
+    traffic = head_on(9.0, channel(until=100.0))
+    traffic._channel.publish(Announcement("carl", 0.0, np.array([[parked_at, 3.0, 0.0]]), 0.0))
+    result, _ = give_way(hall, traffic=traffic, navigation_map=seen, longest_wait=4.0)
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
-    assert math.isfinite(world.cost_at(seen, 5.3, 3.0)) == leaves
+    assert math.isfinite(world.cost_at(seen, 5.3, 3.0)) == is_forgotten
     assert math.isinf(world.cost_at(seen, 5.2, 3.9))
 
 

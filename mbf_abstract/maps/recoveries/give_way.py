@@ -23,7 +23,7 @@ The server's ``recovery_patience`` must leave time for drive and wait.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 from typing import ClassVar
@@ -46,8 +46,7 @@ from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.right_of_way import MEETING_LENGTH, right_of_way
 
 LOOKAHEAD = 0.25  # m to the point of the manoeuvre that is steered to
-ATTEMPTS = 4  # to drive to a place
-PAUSE = 2.0  # s between two of them
+ATTEMPTS, PAUSE = 4, 2.0  # to drive to a place; s between two of them
 WAIT_PERIOD = 0.5  # s between two looks at where the other robots are
 MOVED = 0.2  # m, of another robot that does not stand
 MOST_WAITS = 3.0  # times longest_wait, for robots that move again and again
@@ -135,7 +134,9 @@ class GiveWayRecovery(GuardedRecovery):
             result = self._drive_along(begin, steps, request)
             if result.outcome != RecoveryOutcome.IMPASSABLE:
                 break
-            stand(request, PAUSE)  # somebody who moves there stops before this robot, or passes
+            paused = stand(request, PAUSE)  # somebody who moves there stops before this robot, or passes
+            if not paused.success:
+                return paused
         return result
 
     def _stand_aside(self, request: RecoveryRequest, before: list[Announcement]) -> RecoveryResult:
@@ -150,7 +151,7 @@ class GiveWayRecovery(GuardedRecovery):
         frame = Transform(begin.position, begin.orientation, begin.frame_id, "begin")
         at: PlanarPose = (0.0, 0.0, 0.0)
         for gear, section in groupby(steps, key=lambda step: step.gear):
-            planned = [at, *_poses(section)]
+            planned = [at, *(pose for step in section for pose in step.poses)]
             poses = [frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id="begin")) for x, y, yaw in planned]
             result = self._turn(request, poses[-1]) if gear == 0 else self._follow(request, poses, gear)
             if not result.success:
@@ -201,7 +202,8 @@ class GiveWayRecovery(GuardedRecovery):
         """Free what the maps keep of places (3,) [m] that these robots have left: no ray passes all of its cells."""
         now, size = self.clock.now(), self.parameters.distance
         present = {other.name: other.way[0] for other in self.traffic.others(now)}
-        left = [place for name, place in stood.items() if norm(present.get(name, place) - place) > size]
+        known = [stood[name] for name in stood if name in present]
+        left = [place for place in known if all(norm(there - place) > size for there in present.values())]
         for one in (self.maps.values() or [self.navigation_map]) if left else ():
             for x, y, z in np.array(left).tolist():
                 one.clear_area(self.on_map(Pose.planar(x, y, z=z, frame_id=pose.frame_id), one), size)
@@ -248,7 +250,3 @@ class GiveWayRecovery(GuardedRecovery):
             return Twist.planar(wz=max(-limit, min(limit, 2.0 * left(pose))))
 
         return self.drive(request, velocity, lambda pose: abs(left(pose)) <= HEADING_REACHED)
-
-
-def _poses(steps: Iterable[Step]) -> list[PlanarPose]:
-    return [pose for step in steps for pose in step.poses]
