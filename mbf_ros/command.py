@@ -66,6 +66,9 @@ def serve(
     keep_goals: bool = typer.Option(
         False, "--keep-goals", help="A goal goes on when its client is gone; else it is canceled."
     ),
+    map_period: float = typer.Option(
+        1.0, "--map-period", min=0.05, help="Least time between two messages of a costmap or a mesh, in s."
+    ),
     robot_only: bool = typer.Option(
         False, "--robot-only", help="Only the robot of a scenario, for a navigator that connects: see bridge connect."
     ),
@@ -88,7 +91,7 @@ def serve(
         app = FoxgloveOptions.given(foxglove, foxglove_at, foxglove_token, foxglove_read_only, foxglove_origin)
         access = _access(host, token)
         server_options = ServerOptions(access, port, tuple(allow_origin), max_message)
-        options = BridgeOptions(server_options, not keep_goals, stamped, sensors_of(sensor))
+        options = BridgeOptions(server_options, not keep_goals, stamped, sensors_of(sensor), map_period)
         if robot_only and app is not None:
             raise ValueError("--foxglove shows a navigator, which --robot-only leaves out")
         if robot_only and _is_navigation(Path(what)):

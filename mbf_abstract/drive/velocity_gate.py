@@ -151,6 +151,11 @@ class VelocityGate:
         return lease.owner if lease else ""
 
     @property
+    def closed(self) -> bool:
+        """Whether the robot stands for good."""
+        return self._closed
+
+    @property
     def last_command(self) -> Command:
         """The last command sent to the robot."""
         return self._writer.last_command

@@ -56,6 +56,11 @@ class LoadedPlugin(Generic[P]):
         """Who is using the instance, for messages."""
         return str(self._user)
 
+    @property
+    def in_use(self) -> bool:
+        """Whether somebody is using the instance."""
+        return self._user is not None
+
     def acquire(self, user: object, give_up: Callable[[], bool]) -> bool:
         """Wait for exclusive use; False once ``give_up()``, asked 20 times a second, is true.
 

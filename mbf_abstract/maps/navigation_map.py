@@ -126,6 +126,11 @@ class NavigationMap(ABC):
         """The robot's outline for contacts with moving objects."""
         return RobotBox.disc(self.inscribed_radius)
 
+    @property
+    def robot_outline(self) -> FloatArray:
+        """Corners (n, 2) [m] of the robot in its own frame, for pictures; of a polygon around a round robot."""
+        return self.robot_box.outline()
+
     def safe_share(self, pose: Pose, velocity: Twist, command: Twist, now: float) -> tuple[float, str, float]:
         """How much of a command the robot may follow and still stop before it touches anything that moves.
 

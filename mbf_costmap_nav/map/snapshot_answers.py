@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import replace
 
-from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
@@ -53,6 +53,11 @@ class SnapshotAnswers(LayeredMap):
             return RobotBox.disc(outline.circumscribed_radius)
         (back, right), (front, left) = outline.vertices.min(axis=0).tolist(), outline.vertices.max(axis=0).tolist()
         return RobotBox(back, front, right, left, 0.0)
+
+    @property
+    def robot_outline(self) -> FloatArray:
+        """Corners (n, 2) [m] of the padded footprint."""
+        return self.footprint.vertices
 
     def point_check(self) -> PlaceCheck:
         """State and cost of the cells of points."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Quaternion, Twist, Vector3
@@ -244,8 +243,3 @@ def transforms_of(
         except TransformError as error:
             raise InvalidValueError(str(error)) from error
     return found
-
-
-def points_message(points: NDArray[Any]) -> list[Message]:
-    """Return points (n, 3) as a list of geometry_msgs/Point."""
-    return [{"x": x, "y": y, "z": z} for x, y, z in np.asarray(points, dtype=np.float64).tolist()]

@@ -21,11 +21,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_ros.messages.records import Records
+
 Message = dict[str, Any]
 """A message by field name."""
 
 FLOATS = {"float32": np.float32, "float64": np.float64}
 INTEGERS = {name: np.dtype(name) for name in ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")}
+INTEGERS["byte"] = np.dtype("uint8")
 TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 HEADER = "std_msgs/msg/Header"
 PIECE = 10_000  # numbers that are written at a time
@@ -160,7 +163,7 @@ def _checked(field: Field, value: Any, where: str) -> Any:
         if field.length and len(array) != field.length:
             raise MessageError(f"{where}: expected {field.length} numbers, got {len(array)}")
         return array
-    if not isinstance(value, list | tuple):
+    if not isinstance(value, list | tuple | Records):
         raise MessageError(f"{where}: expected a list of {field.type}, got {_shown(value)}")
     return [_checked_element(field.type, element, f"{where}[{i}]") for i, element in enumerate(value)]
 
@@ -230,7 +233,7 @@ def json_text(value: Any) -> str:
     """
     if isinstance(value, Mapping):
         return "{" + ",".join(f"{json.dumps(str(key))}:{json_text(inner)}" for key, inner in value.items()) + "}"
-    if isinstance(value, list | tuple):
+    if isinstance(value, list | tuple | Records):
         return "[" + ",".join(map(json_text, value)) + "]"
     if isinstance(value, np.ndarray):
         if value.dtype == np.uint8:

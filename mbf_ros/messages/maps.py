@@ -1,30 +1,64 @@
-"""Views of our maps as messages: OccupancyGrid, mesh_msgs, and markers for viewers that know no mesh_msgs."""
+"""Views of our maps as messages: OccupancyGrid, its updates, mesh_msgs, and markers for viewers without mesh_msgs."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.maps.view import FieldView, GridView, MeshView
-from mbf_ros.messages.geometry import MessageContext, duration, points_message, pose, vector
+from mbf_ros.messages.geometry import MessageContext, duration, pose, vector
 from mbf_ros.messages.interfaces import Message
+from mbf_ros.messages.records import colors, points, triangles
 
-UNKNOWN_CELL = -1
+UNKNOWN_CELL, INSCRIBED_CELL, LETHAL_CELL = -1, 99, 100
+COST_STEPS = 253
+"""Cost 1 of a view in the units of a costmap, whose costs 1 to 252 are the cells 1 to 98, as in Nav2."""
 LINE_LIST, TRIANGLE_LIST = 5, 11
 FREE_COLOR, FORBIDDEN_COLOR = (0.55, 0.75, 0.55), (0.80, 0.25, 0.20)
 ARROW_LENGTH = 0.25  # m
 
 
+class CellWindow(NamedTuple):
+    """A rectangle of cells: x0 <= column < x1, y0 <= row < y1."""
+
+    x0: int
+    y0: int
+    x1: int
+    y1: int
+
+
+def occupancy_cells(costs: NDArray[np.float32]) -> NDArray[np.int8]:
+    """Return costs (height, width) as cells of an OccupancyGrid, on the scale of Nav2's costmaps.
+
+    0 is free, 99 where the robot's middle must not be (cost 1), 100 an obstacle (above 1), and -1 unknown (nan).
+    """
+    known = np.nan_to_num(costs, nan=0.0, posinf=2.0)
+    cells: NDArray[np.int8] = np.clip(np.floor(97.0 * (COST_STEPS * known - 1.0) / 251.0) + 1.0, 1.0, 98.0).astype(
+        np.int8
+    )
+    cells[known <= 0.0] = 0
+    cells[known >= 1.0] = INSCRIBED_CELL
+    cells[known > 1.0] = LETHAL_CELL
+    cells[np.isnan(costs)] = UNKNOWN_CELL
+    return cells
+
+
+def changed_window(before: NDArray[np.int8], after: NDArray[np.int8]) -> CellWindow | None:
+    """Return the smallest window (both (height, width)) that holds all cells that differ; None if none does."""
+    different = before != after
+    rows, columns = np.flatnonzero(different.any(axis=1)), np.flatnonzero(different.any(axis=0))
+    if not len(rows):
+        return None
+    return CellWindow(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
+
+
 def occupancy_grid(view: GridView, frame_id: str, stamp: float, context: MessageContext) -> Message:
-    """Return costs of cells as a nav_msgs/OccupancyGrid: 0 free to 100 forbidden, -1 unknown."""
+    """Return costs of cells as a nav_msgs/OccupancyGrid, see ``occupancy_cells``."""
     height, width = view.costs.shape
     x_min, x_max, y_min, _ = view.extent
-    known = ~np.isnan(view.costs)
-    cells = np.full(view.costs.shape, UNKNOWN_CELL, np.int8)
-    cells[known] = np.rint(np.clip(view.costs[known], 0.0, 1.0) * 100.0).astype(np.int8)
     header = context.header(frame_id, stamp)
     return {
         "header": header,
@@ -35,8 +69,27 @@ def occupancy_grid(view: GridView, frame_id: str, stamp: float, context: Message
             "height": height,
             "origin": pose(Pose((x_min, y_min, 0.0))),
         },
-        "data": cells.reshape(-1),
+        "data": occupancy_cells(view.costs).reshape(-1),
     }
+
+
+def occupancy_grid_update(
+    cells: NDArray[np.int8], window: CellWindow, frame_id: str, stamp: float, context: MessageContext
+) -> Message:
+    """Return the cells of a window as a map_msgs/OccupancyGridUpdate of the grid ``cells`` (height, width)."""
+    return {
+        "header": context.header(frame_id, stamp),
+        "x": window.x0,
+        "y": window.y0,
+        "width": window.x1 - window.x0,
+        "height": window.y1 - window.y0,
+        "data": np.ascontiguousarray(cells[window.y0 : window.y1, window.x0 : window.x1]).reshape(-1),
+    }
+
+
+def polygon(corners: FloatArray, frame_id: str, stamp: float, context: MessageContext) -> Message:
+    """Return corners (n, 3) [m] as a geometry_msgs/PolygonStamped."""
+    return {"header": context.header(frame_id, stamp), "polygon": {"points": points(corners, "float32")}}
 
 
 def mesh_geometry(view: MeshView, uuid: str, frame_id: str, stamp: float, context: MessageContext) -> Message:
@@ -45,9 +98,9 @@ def mesh_geometry(view: MeshView, uuid: str, frame_id: str, stamp: float, contex
         "header": context.header(frame_id, stamp),
         "uuid": uuid,
         "mesh_geometry": {
-            "vertices": points_message(view.vertices),
+            "vertices": points(view.vertices),
             "vertex_normals": [],
-            "faces": [{"vertex_indices": face} for face in view.faces.astype(np.uint32)],
+            "faces": triangles(view.faces),
         },
     }
 
@@ -65,11 +118,12 @@ def mesh_costs(view: MeshView, uuid: str, layer: str, frame_id: str, stamp: floa
 def mesh_markers(view: MeshView, frame_id: str, stamp: float, context: MessageContext) -> Message:
     """Return a mesh as a visualization_msgs/MarkerArray: triangles coloured by cost, from free to forbidden."""
     shares = np.clip(np.nan_to_num(view.costs, nan=1.0, posinf=1.0), 0.0, 1.0)[:, None]
-    colors = (1.0 - shares) * np.array(FREE_COLOR) + shares * np.array(FORBIDDEN_COLOR)
+    rgb = (1.0 - shares) * np.array(FREE_COLOR) + shares * np.array(FORBIDDEN_COLOR)
+    rgba = np.column_stack([rgb, np.ones(len(rgb))])
     corners = view.faces.reshape(-1)
     marker = _marker(TRIANGLE_LIST, "mesh", frame_id, stamp, context, (1.0, 1.0, 1.0))
-    marker["points"] = points_message(view.vertices[corners])
-    marker["colors"] = [_color(rgb) for rgb in colors[corners].tolist()]
+    marker["points"] = points(view.vertices[corners])
+    marker["colors"] = colors(rgba[corners])
     return {"markers": [marker]}
 
 
@@ -78,7 +132,7 @@ def field_markers(view: FieldView, frame_id: str, stamp: float, context: Message
     tips = view.points + ARROW_LENGTH * view.directions.astype(np.float64)
     ends: NDArray[Any] = np.stack([view.points, tips], axis=1).reshape(-1, 3)
     marker = _marker(LINE_LIST, "vector_field", frame_id, stamp, context, (0.02, 0.0, 0.0))
-    marker["points"] = points_message(ends)
+    marker["points"] = points(ends)
     return {"markers": [marker]}
 
 

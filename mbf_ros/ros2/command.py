@@ -49,6 +49,9 @@ def ros2(
     amcl: bool = typer.Option(
         False, "--amcl", help="Answer Nav2's clients for amcl, too: the robot is localised by something else."
     ),
+    map_period: float = typer.Option(
+        1.0, "--map-period", min=0.05, help="Least time between two messages of a costmap or a mesh, in s."
+    ),
     foxglove: bool = FOXGLOVE,
     foxglove_at: str = AT,
     foxglove_token: bool = TOKEN,
@@ -78,6 +81,7 @@ def ros2(
             tuple(ros_arguments or ()),
             nav2=nav2,
             stands_for_amcl=amcl,
+            map_period=map_period,
         )
         with (
             navigation_node(config, options) as node,
@@ -92,7 +96,7 @@ def ros2(
 def ros2_interfaces(
     into: Path = typer.Option(None, "--into", help="Folder for the packages; that of this Python if not given."),
 ) -> None:
-    """Compile mbf_msgs, nav2_msgs and tf2_msgs, which the wheels of ROS 2 lack; needs gcc."""
+    """Compile map_msgs, mbf_msgs, mesh_msgs, nav2_msgs and tf2_msgs, which the wheels of ROS 2 lack; needs gcc."""
     with readable_errors():
         from mbf_ros.ros2.interfaces.building import build
         from mbf_ros.ros2.interfaces.definitions import PACKAGES

@@ -42,6 +42,8 @@ def to_dict(message: Any) -> Message:
 def _plain(value: Any) -> Any:
     if isinstance(value, array):
         return np.asarray(value)
+    if isinstance(value, bytes):  # one byte
+        return value[0]
     if isinstance(value, list):
         return [_plain(one) for one in value]
     return to_dict(value) if hasattr(value, "get_fields_and_field_types") else value
@@ -67,6 +69,8 @@ def _write(message: Any, name: str, value: Any) -> None:
     elif isinstance(value, list) and value and isinstance(value[0], Mapping):
         element = _element_class(message.get_fields_and_field_types()[name])
         setattr(message, name, [fill(element(), one) for one in value])
+    elif isinstance(present, bytes):  # a byte, which is a number here
+        setattr(message, name, bytes([value]))
     elif isinstance(present, bool | int | float):  # rclpy reads the bits of an int as those of a float
         setattr(message, name, type(present)(value))
     else:

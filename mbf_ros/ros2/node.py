@@ -98,7 +98,7 @@ class NavigationNode(RobotNavigation):
         server = self.session.navigator.server
         NodeParameters(self._node, server)
         self._open_topics(config)
-        serving = Serving(self._send, self._context, self._refusal, self._fail)
+        serving = Serving(self.session.navigator.send, self._context, self._refusal, self._fail)
         self._actions = [ServedAction(self._node, f"~/{name}", *action, serving) for name, action in ACTIONS.items()]
         if not self._options.keep_goals:
             self._repeat(CLIENT_PERIOD, self._cancel_abandoned)
@@ -145,8 +145,10 @@ class NavigationNode(RobotNavigation):
 
     def _open_topics(self, config: Config) -> None:
         navigator = self.session.navigator
-        self._shown = Outputs(self._node, navigator, self._context)
-        self._closing.callback(self._shown.close)
+        outputs = Outputs(
+            self._node, self.session, self._real_time, self._context, self._robot.problems, self._options.map_period
+        )
+        self._closing.callback(outputs.close)
         inputs = RobotInputs(self._clock.now, self._context, self._arrivals.hear)
         uses_odometry = config.parameters.use_odometry
         self._forget_arrivals()
@@ -154,7 +156,7 @@ class NavigationNode(RobotNavigation):
         listening = Inputs(self._node)
         listening.listen(inputs.of_robot(self._robot, self._transforms, uses_odometry))
         listening.listen(inputs.of_sensors(navigator.server.take_scan, sensors))
-        listening.listen(inputs.of_users(self._send, self._refusal))
+        listening.listen(inputs.of_users(navigator.send, self._refusal))
 
     # ------------------------------------------------------------------------------------------- watching
     def _warn(self, text: str) -> None:

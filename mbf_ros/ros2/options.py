@@ -26,6 +26,8 @@ class NodeOptions:
         Offer Nav2's names; None = where nav2_msgs is installed.
     stands_for_amcl : bool
         Answer for the node ``amcl``, too, for which Nav2's clients wait; see ``nav2_services``. Offers Nav2's names.
+    map_period : float
+        Least time [s] between two messages of a map.
     time_to_end : float
         Longest time [s] for goals to end and their results to be sent when the node ends.
     time_to_send : float
@@ -44,6 +46,7 @@ class NodeOptions:
     ros_arguments: tuple[str, ...] = ()
     nav2: bool | None = None
     stands_for_amcl: bool = False
+    map_period: float = 1.0
     time_to_end: float = 2.0
     time_to_send: float = 0.5
 

@@ -17,6 +17,8 @@ from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.time.clock import Clock
 
+TRANSFORM = "tf"
+
 
 @dataclass(frozen=True)
 class Frames:
@@ -46,14 +48,19 @@ class Arrivals:
         self._heard[topic] = self._now()
 
     def problem(self, limit: float) -> str:
-        """Which topic has been silent for longer than ``limit`` [s]; empty if none."""
+        """What is wrong with the first topic that has been silent for longer than ``limit`` [s]; empty if none has."""
+        return next(filter(None, self.problems(limit).values()), "")
+
+    def problems(self, limit: float) -> dict[str, str]:
+        """What is wrong with each topic, empty for one on which a message has come in the last ``limit`` [s]."""
         now = self._now()
-        for topic, heard in tuple(self._heard.items()):
-            if heard is None:
-                return f"no message has come on {topic} yet"
-            if now - heard > limit:
-                return f"no message on {topic} for {now - heard:.2f} s"
-        return ""
+        return {topic: _silence(topic, heard, now, limit) for topic, heard in tuple(self._heard.items())}
+
+
+def _silence(topic: str, heard: float | None, now: float, limit: float) -> str:
+    if heard is None:
+        return f"no message has come on {topic} yet"
+    return f"no message on {topic} for {now - heard:.2f} s" if now - heard > limit else ""
 
 
 class RosRobot:
@@ -106,12 +113,15 @@ class RosRobot:
 
     def problem(self) -> str:
         """What fails to come; empty if all does."""
+        return next(filter(None, self.problems().values()), "")
+
+    def problems(self) -> dict[str, str]:
+        """What is wrong with each topic that must come, and with the robot's transform; empty where nothing is."""
         limit = self._max_silence()
-        if problem := self._arrivals.problem(limit):
-            return problem
         target, source = self._frames.global_frame, self._frames.robot_frame
         try:
             self._transforms.lookup(target, source, now=self._clock.now(), max_age=limit)
+            transform = ""
         except TransformError as error:
-            return str(error)
-        return ""
+            transform = str(error)
+        return {**self._arrivals.problems(limit), TRANSFORM: transform}

@@ -39,13 +39,6 @@ class Commands(Protocol):
         """Wait until the last command has left, for at most ``seconds``."""
 
 
-class Shown(Protocol):
-    """What users see."""
-
-    def show_goal(self, goal: MoveBaseGoal) -> None:
-        """Publish where the robot is to go."""
-
-
 class RobotNavigation(ABC):
     """The base of such a navigator.
 
@@ -69,7 +62,6 @@ class RobotNavigation(ABC):
     _arrivals: Arrivals
     _frames: Frames
     _clock: RosClock
-    _shown: Shown
 
     def __init__(self, max_silence: float | None, time_to_end: float) -> None:
         self._given_silence, self._time_to_end = max_silence, time_to_end
@@ -85,7 +77,7 @@ class RobotNavigation(ABC):
         """Send a goal of nobody, as those of topics are; raises ValueError where none is taken yet, or any more."""
         if reason := self._refusal():
             raise ValueError(reason)
-        return self._send(goal)
+        return self.session.navigator.send(goal)
 
     def close(self) -> None:
         """Stop the robot, end the goals and leave; once."""
@@ -160,11 +152,6 @@ class RobotNavigation(ABC):
         if self._ending.is_set():
             return f"the {self.name} ends"
         return "" if self._ready.is_set() else f"the {self.name} is not ready"
-
-    def _send(self, goal: Any) -> AnyGoalHandle:
-        if isinstance(goal, MoveBaseGoal):
-            self._shown.show_goal(goal)
-        return self.session.navigator.send(goal)
 
     def _watch(self) -> None:
         """Stop the robot where something fails to come."""

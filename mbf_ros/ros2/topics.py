@@ -1,31 +1,32 @@
-"""The topics of the node: what it hears from the robot and its users, and the plan and goal that it shows."""
+"""The topics of the node: what it hears from the robot and its users, and what it shows of the navigator."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from mbf_abstract.event_values import error_text
-from mbf_abstract.geometry import Command, Path
-from mbf_abstract.goals.goal_types import MoveBaseGoal
-from mbf_abstract.goals.handle import AnyGoalHandle
-from mbf_abstract.navigator import Navigator
-from mbf_abstract.time.clock import Clock
+from mbf_abstract.geometry import Command
+from mbf_abstract.session import NavigationSession
+from mbf_abstract.time.clock import Clock, WallClock
+from mbf_abstract.time.ticker import Ticker
+from mbf_ros.map_messages import Audience, Output
+from mbf_ros.messages.cdr import serialized
 from mbf_ros.messages.geometry import (
     MessageContext,
     command_twist,
-    path_message,
-    pose_stamped,
     twist,
     twist_stamped,
 )
 from mbf_ros.messages.interfaces import MessageError
+from mbf_ros.navigator_messages import NavigatorMessages
 from mbf_ros.robot_inputs import Input, Quality
-from mbf_ros.ros2.conversion import fill, interface_class, to_dict
+from mbf_ros.ros2.conversion import MissingInterfaceError, fill, interface_class, to_dict
 
 CMD_VEL = "cmd_vel"
 DEPTH = 100
 """How many messages of a topic wait to be taken."""
+PERIOD = 0.05  # s between two looks at what is new
 WARN_PERIOD = 5.0  # s between two warnings about messages of one topic
 
 
@@ -53,23 +54,28 @@ class CommandTopic:
         self._publisher.wait_for_all_acked(Duration(seconds=seconds))
 
 
+def profile(quality: Quality, depth: int) -> Any:
+    """Return the QoS profile of a topic on which ``depth`` messages may wait."""
+    from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+
+    if quality is Quality.SENSOR_DATA:
+        return qos_profile_sensor_data
+    latched = quality is Quality.LATCHED
+    return QoSProfile(
+        depth=depth, durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+    )
+
+
 class Inputs:
     """Subscriptions; a message that means nothing is dropped with a warning."""
 
     def __init__(self, node: Any) -> None:
-        from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
-
         self._node = node
-        self._qualities = {
-            Quality.SENSOR_DATA: qos_profile_sensor_data,
-            Quality.MANY: QoSProfile(depth=DEPTH),
-            Quality.LATCHED: QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL),
-        }
 
     def listen(self, inputs: Iterable[Input]) -> None:
         """Subscribe topics."""
         for one in inputs:
-            kind, quality = interface_class(one.type), self._qualities[one.quality]
+            kind, quality = interface_class(one.type), profile(one.quality, DEPTH)
             self._node.create_subscription(kind, one.topic, self._taking(one), quality)
 
     def _taking(self, one: Input) -> Callable[[Any], None]:
@@ -85,28 +91,59 @@ class Inputs:
 
 
 class Outputs:
-    """Publishes the last ``plan`` and ``~/current_goal``, for late subscribers too."""
+    """Publishes what is new of a navigator, on a thread of its own; nothing but plan and goal if nobody listens.
 
-    def __init__(self, node: Any, navigator: Navigator, context: Callable[[], MessageContext]) -> None:
-        from rclpy.qos import DurabilityPolicy, QoSProfile
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    session : NavigationSession
+    real_time : WallClock
+    context : callable
+        How stamps and frames relate to ours, now.
+    problems : callable
+        What is wrong with each topic that must come.
+    map_period : float
+        Least time [s] between two messages of a map.
+    """
 
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._context, self._action = context, navigator.server.get_path
-        self._path_class = interface_class("nav_msgs/Path")
-        self._pose_class = interface_class("geometry_msgs/PoseStamped")
-        self._plan = node.create_publisher(self._path_class, "plan", latched)
-        self._goal = node.create_publisher(self._pose_class, "~/current_goal", latched)
-        self._action.listeners.append(self._show_plan)
+    def __init__(
+        self,
+        node: Any,
+        session: NavigationSession,
+        real_time: WallClock,
+        context: Callable[[], MessageContext],
+        problems: Callable[[], Mapping[str, str]],
+        map_period: float,
+    ) -> None:
+        self._node = node
+        self._messages = NavigatorMessages(session, real_time, context, self._audience, problems, map_period)
+        made = ((one, self._made(one)) for one in self._messages.outputs)
+        self._publishers = {one.topic: (one.type, publisher) for one, publisher in made if publisher is not None}
+        self._audiences = dict.fromkeys(self._publishers, Audience(0, 0))
+        self._ticker = Ticker(real_time, session.events, self._publish, PERIOD, "ros publisher")
 
     def close(self) -> None:
         """Publish no more."""
-        self._action.listeners.remove(self._show_plan)
+        self._ticker.stop()
+        self._messages.close()
 
-    def show_goal(self, goal: MoveBaseGoal) -> None:
-        """Publish where the robot is to go."""
-        self._goal.publish(fill(self._pose_class(), pose_stamped(goal.target_pose, self._context())))
+    def _made(self, one: Output) -> Any:
+        """The publisher of a topic; None where the package of its messages is not installed."""
+        try:
+            kind = interface_class(one.type)
+        except MissingInterfaceError as error:
+            self._node.get_logger().info(f"{one.topic} is not published: {error}")
+            return None
+        return self._node.create_publisher(kind, one.topic, profile(one.quality, one.depth))
 
-    def _show_plan(self, handle: AnyGoalHandle) -> None:
-        path: Path | None = handle.result.path if handle.result is not None else None
-        if path is not None:
-            self._plan.publish(fill(self._path_class(), path_message(path, self._context())))
+    def _audience(self, topic: str) -> Audience:
+        if topic not in self._publishers:
+            return Audience(0, 0)
+        count, before = self._publishers[topic][1].get_subscription_count(), self._audiences[topic]
+        self._audiences[topic] = Audience(count, before.joined + (count > before.listeners))
+        return self._audiences[topic]
+
+    def _publish(self) -> None:
+        for topic, message in self._messages.changes():
+            type_name, publisher = self._publishers[topic]
+            publisher.publish(serialized(type_name, message))

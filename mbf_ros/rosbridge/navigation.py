@@ -8,6 +8,7 @@ from typing import Any
 
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.navigator import Navigator
+from mbf_ros.map_messages import Output
 from mbf_ros.messages import mbf_actions, nav2_actions, nav2_waypoints
 from mbf_ros.messages.action_mapping import ActionMapping
 from mbf_ros.messages.geometry import MessageContext
@@ -51,6 +52,11 @@ def serve_navigator(bridge: Bridge, navigator: Navigator, context: MessageContex
         f"{NODE}/pause": _trigger(server.pause_all, "all goals paused"),
         f"{NODE}/resume": _trigger(server.resume_all, "all goals go on"),
     }
+
+
+def node_topic(output: Output) -> str:
+    """Return the full name of a topic, with that of the node for ``~``."""
+    return absolute(output.topic.replace("~", NODE, 1))
 
 
 class ServerParameters:

@@ -6,33 +6,22 @@ The control loop is not part of it and never waits for it.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
-from mbf_abstract.events import Event
-from mbf_abstract.geometry import Command, Path, Pose
-from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.geometry import Command
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.ticker import Ticker
-from mbf_ros.messages import maps
-from mbf_ros.messages.geometry import (
-    MessageContext,
-    command_twist,
-    path_message,
-    pose_stamped,
-    twist,
-    twist_stamped,
-)
+from mbf_ros.map_messages import Audience
+from mbf_ros.messages.geometry import MessageContext, command_twist, twist, twist_stamped
 from mbf_ros.messages.interfaces import Message
+from mbf_ros.navigator_messages import NavigatorMessages
 from mbf_ros.rosbridge.actionlib import ActionlibServer
-from mbf_ros.rosbridge.map_topics import MapTopics
-from mbf_ros.rosbridge.navigation import NODE
+from mbf_ros.rosbridge.navigation import node_topic
 from mbf_ros.rosbridge.protocol import frame
 from mbf_ros.rosbridge.topics import TopicTable
 from mbf_ros.rosbridge_robot.robot_state import RobotState
 
-STATUS_PERIOD = 1.0  # s between two lists of actionlib, and two looks at the maps
-MAX_EVENTS = 1000
+STATUS_PERIOD = 1.0  # s between two lists of actionlib
 
 
 class Publisher:
@@ -51,6 +40,10 @@ class Publisher:
         Publish tf, odometry and scans too, which else come from the robot.
     stamped_commands : bool
         Publish ``/cmd_vel`` as TwistStamped.
+    map_period : float
+        Least time between two messages of a map [s].
+    problems : callable
+        What is wrong with each topic that must come from a robot.
     period : float
         Time between two looks at the state [s].
     """
@@ -64,34 +57,28 @@ class Publisher:
         actionlib: ActionlibServer,
         simulated: bool,
         stamped_commands: bool = False,
+        map_period: float = 1.0,
+        problems: Callable[[], Mapping[str, str]] = dict,
         period: float = 0.05,
     ) -> None:
         self._session, self._server = session, session.navigator.server
         self._topics, self._context, self._post, self._actionlib = topics, context, post, actionlib
         self._stamped_commands = stamped_commands
-        self._events: deque[Event] = deque(maxlen=MAX_EVENTS)
-        self._plan: Path | None = None
-        self._shown_plan: Path | None = None
-        self._goal: Pose | None = None
         self._next_status = 0.0
-        self._maps = MapTopics(self._server, topics, context)
+        self._messages = NavigatorMessages(
+            session, session.clock, lambda: context, self._audience, problems, map_period
+        )
+        self._outputs = {one.topic: node_topic(one) for one in self._messages.outputs}
         self._add_topics()
         self._robot_state = RobotState(session, topics, context, self._send) if simulated else None
-        self._server.get_path.listeners.append(self._take_plan)
-        session.events.add_sink(self)
         self._ticker = Ticker(session.clock, session.events, self._tick, period, "rosbridge publisher")
 
     def close(self) -> None:
         """Publish no more."""
         self._ticker.stop()
-        self._session.events.remove_sink(self)
-        self._server.get_path.listeners.remove(self._take_plan)
+        self._messages.close()
         if self._robot_state is not None:
             self._robot_state.close()
-
-    def write(self, event: Event) -> None:
-        """Keep an event until the next look; the oldest are dropped."""
-        self._events.append(event)
 
     def send_command(self, command: Command) -> None:
         """Publish a command at once, for a robot that listens to ``/cmd_vel``; never waits."""
@@ -104,50 +91,23 @@ class Publisher:
     def _add_topics(self) -> None:
         add = self._topics.add_output
         add("/cmd_vel", "geometry_msgs/TwistStamped" if self._stamped_commands else "geometry_msgs/Twist")
-        add("/plan", "nav_msgs/Path", latched=True)
-        add(f"{NODE}/current_goal", "geometry_msgs/PoseStamped", latched=True)
-        add(f"{NODE}/events", "std_msgs/String", depth=MAX_EVENTS)
-        add(f"{NODE}/vector_field", "visualization_msgs/MarkerArray")
+        for one in self._messages.outputs:
+            add(node_topic(one), one.type, latched=one.always, depth=one.depth)
+
+    def _audience(self, topic: str) -> Audience:
+        return Audience(*self._topics.audience(self._outputs[topic]))
 
     def _tick(self) -> None:
         if self._robot_state is not None:
             self._robot_state.publish()
             self.send_command(self._server.runtime.gate.last_command)
-        self._publish_plan()
-        self._publish_goal()
-        self._publish_events()
+        for topic, message in self._messages.changes():
+            self._send(self._outputs[topic], message)
         now = self._session.clock.now()
         if now >= self._next_status:
             self._next_status = now + STATUS_PERIOD
             self._post(self._actionlib.send_status)
-            for topic, message in self._maps.changed(now):
-                self._send(topic, message)
 
     def _send(self, topic: str, message: Message) -> None:
         if self._topics.is_wanted(topic):
             self._post(self._topics.send, topic, frame("publish", topic=topic, msg=message))
-
-    def _take_plan(self, handle: AnyGoalHandle) -> None:
-        if handle.result is not None and handle.result.path is not None:
-            self._plan = handle.result.path
-
-    def _publish_plan(self) -> None:
-        if self._plan is not self._shown_plan and self._plan is not None:
-            self._shown_plan = self._plan
-            self._send("/plan", path_message(self._plan, self._context))
-            field = f"{NODE}/vector_field"
-            view = self._server.field_view(self._plan) if self._topics.is_wanted(field) else None
-            if view is not None:
-                self._send(field, maps.field_markers(view, self._plan.frame_id, self._plan.stamp, self._context))
-
-    def _publish_goal(self) -> None:
-        unfinished = self._server.move_base.unfinished
-        goal = unfinished[-1].goal.target_pose if unfinished else None
-        if goal is not None and goal is not self._goal:
-            self._send(f"{NODE}/current_goal", pose_stamped(goal, self._context))
-        self._goal = goal
-
-    def _publish_events(self) -> None:
-        while self._events:
-            event = self._events.popleft()
-            self._send(f"{NODE}/events", {"data": event.to_json()})

@@ -51,6 +51,8 @@ class BridgeOptions:
         Whether the goals of a client that is gone are canceled, and the robot stops.
     stamped_commands : bool
         Publish ``/cmd_vel`` as TwistStamped, as Nav2 does from Kilted on, instead of Twist.
+    map_period : float
+        Least time [s] between two messages of a map.
     sensors : mapping of str to (str, str)
         Of a ``TopicRobot``: type and source in the configuration of each topic of a sensor.
     """
@@ -59,6 +61,7 @@ class BridgeOptions:
     cancel_on_disconnect: bool = True
     stamped_commands: bool = False
     sensors: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    map_period: float = 1.0
 
 
 @contextmanager
@@ -94,7 +97,15 @@ def serve_session(
         robot.listen(bridge.topics, context, navigator.server, options.sensors)
     with ExitStack() as closing:
         publisher = Publisher(
-            session, bridge.topics, context, server.post, actionlib, robot is None, options.stamped_commands
+            session,
+            bridge.topics,
+            context,
+            server.post,
+            actionlib,
+            simulated=robot is None,
+            stamped_commands=options.stamped_commands,
+            map_period=options.map_period,
+            problems=dict if robot is None else robot.problems,
         )
         closing.callback(publisher.close)
         if robot is not None:

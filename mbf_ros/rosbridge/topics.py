@@ -143,9 +143,10 @@ class TopicTable:
         topic = self._topics[name]
         return topic.keeps_last or bool(topic.subscriptions)
 
-    def newcomers(self, name: str) -> int:
-        """How often somebody has begun to listen. On any thread."""
-        return self._topics[name].newcomers
+    def audience(self, name: str) -> tuple[int, int]:
+        """How many listen, and how often somebody has begun to. On any thread."""
+        topic = self._topics[name]
+        return len(topic.subscriptions), topic.newcomers
 
     def send(self, name: str, text: str) -> None:
         """Send the frame of a message to those who listen."""

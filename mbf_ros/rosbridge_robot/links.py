@@ -179,6 +179,6 @@ class LinkArrivals(Arrivals):
         super().__init__(now)
         self._links = links
 
-    def problem(self, limit: float) -> str:
-        """Which connection is lost, or which topic has been silent for longer than ``limit`` [s]; empty if none."""
-        return self._links().problem or super().problem(limit)
+    def problems(self, limit: float) -> dict[str, str]:
+        """As ``Arrivals.problems``, after which connection is lost, and why."""
+        return {"rosbridge": self._links().problem, **super().problems(limit)}

@@ -70,7 +70,6 @@ class RobotNavigator(RobotNavigation):
     """A navigator and its connections; made by ``connect_navigator``."""
 
     name, time_name = "navigator", "the robot's time"
-    _shown: ShownTopics
 
     def __init__(self, address: str, options: RobotOptions, report: Report) -> None:
         super().__init__(options.max_silence, options.time_to_end)
@@ -114,15 +113,17 @@ class RobotNavigator(RobotNavigation):
 
     def _listen(self, config: Config) -> None:
         navigator = self.session.navigator
-        self._shown = ShownTopics(lambda: self._links.data, navigator, self._context)
+        self._shown = ShownTopics(
+            lambda: self._links.data, self.session, self._real_time, self._context, self._robot.problems
+        )
         self._closing.callback(self._shown.close)
-        self._goals = OfferedGoals(lambda: self._links.data, self._send, self._context)
+        self._goals = OfferedGoals(lambda: self._links.data, navigator.send, self._context)
         inputs = RobotInputs(self._clock.now, self._context, self._topics.hear)
         uses_odometry = config.parameters.use_odometry
         sensors = used_sensors(self._options.sensors, navigator.server.listens_to, self._report)
         self._topics.listen_to(inputs.of_robot(self._robot, self._transforms, uses_odometry))
         self._topics.listen_to(inputs.of_sensors(navigator.server.take_scan, sensors), self._options.cloud_period)
-        self._topics.listen_to(inputs.of_users(self._send, self._refusal))
+        self._topics.listen_to(inputs.of_users(navigator.send, self._refusal))
         self._links.handlers |= {
             "send_action_goal": self._goals.take_goal,
             "cancel_action_goal": self._goals.take_cancel,

@@ -1,22 +1,25 @@
-"""What the robot is sent: commands on one connection; plans and goals, to be shown, on the other."""
+"""What the robot is sent: commands on one connection; on the other what is to be shown of the navigator."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 
 from mbf_abstract.geometry import Command, Twist
-from mbf_abstract.goals.goal_types import MoveBaseGoal
-from mbf_abstract.goals.handle import AnyGoalHandle
-from mbf_abstract.navigator import Navigator
+from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import Clock
-from mbf_ros.messages.geometry import MessageContext, command_twist, path_message, pose_stamped, twist, twist_stamped
-from mbf_ros.messages.interfaces import Message
-from mbf_ros.rosbridge.navigation import NODE
+from mbf_abstract.time.ticker import Ticker
+from mbf_ros.map_messages import Audience
+from mbf_ros.messages.geometry import MessageContext, command_twist, twist, twist_stamped
+from mbf_ros.navigator_messages import DIAGNOSTICS, FOOTPRINT, GOAL, LOCAL_PLAN, PLAN, NavigatorMessages
+from mbf_ros.rosbridge.navigation import node_topic
 from mbf_ros.rosbridge.protocol import frame
 from mbf_ros.rosbridge_robot.connection import Connection, NotConnectedError
 
-CMD_VEL, PLAN, GOAL = "/cmd_vel", "/plan", f"{NODE}/current_goal"
-SHOWN = {PLAN: "nav_msgs/Path", GOAL: "geometry_msgs/PoseStamped"}
+CMD_VEL = "/cmd_vel"
+PERIOD = 0.1  # s between two looks at what is new
+SHOWN = (PLAN, GOAL, LOCAL_PLAN, FOOTPRINT, DIAGNOSTICS)
+"""What is published although nobody is known to listen; maps would fill the connection."""
 
 
 class CommandTopic:
@@ -61,35 +64,40 @@ class CommandTopic:
 
 
 class ShownTopics:
-    """Publishes the last plan and goal, again on each new connection."""
+    """Publishes what is small of a navigator, on a thread of its own; plan and goal again on each new connection."""
 
     def __init__(
-        self, connection: Callable[[], Connection], navigator: Navigator, context: Callable[[], MessageContext]
+        self,
+        connection: Callable[[], Connection],
+        session: NavigationSession,
+        real_time: Clock,
+        context: Callable[[], MessageContext],
+        problems: Callable[[], Mapping[str, str]],
     ) -> None:
-        self._connection, self._context, self._action = connection, context, navigator.server.get_path
+        self._connection = connection
+        self._messages = NavigatorMessages(session, real_time, context, _audience, problems)
         self._last: dict[str, str] = {}
-        self._action.listeners.append(self._show_plan)
+        self._ticker = Ticker(real_time, session.events, self._publish, PERIOD, "robot link publisher")
 
     def close(self) -> None:
         """Publish no more."""
-        self._action.listeners.remove(self._show_plan)
-
-    def show_goal(self, goal: MoveBaseGoal) -> None:
-        """Publish where the robot is to go."""
-        self._show(GOAL, pose_stamped(goal.target_pose, self._context()))
+        self._ticker.stop()
+        self._messages.close()
 
     def greeting(self) -> list[str]:
         """Return the frames with which each connection begins."""
-        advertised = [frame("advertise", topic=topic, type=kind, latch=True) for topic, kind in SHOWN.items()]
-        return [*advertised, *self._last.values()]
+        advertised = [frame("advertise", topic=node_topic(one), type=one.type, latch=one.always) for one in SHOWN]
+        return [*advertised, *tuple(self._last.values())]
 
-    def _show_plan(self, handle: AnyGoalHandle) -> None:
-        if handle.result is not None and handle.result.path is not None:
-            self._show(PLAN, path_message(handle.result.path, self._context()))
+    def _publish(self) -> None:
+        shown = {one.topic: one for one in SHOWN}
+        for topic, message in self._messages.changes():
+            text = frame("publish", topic=node_topic(shown[topic]), msg=message)
+            if shown[topic].always:
+                self._last[topic] = text
+            with suppress(NotConnectedError):  # plan and goal are sent when there is a connection again
+                self._connection().newest(node_topic(shown[topic]), text)
 
-    def _show(self, topic: str, message: Message) -> None:
-        self._last[topic] = frame("publish", topic=topic, msg=message)
-        try:
-            self._connection().newest(topic, self._last[topic])
-        except NotConnectedError:
-            return  # it is sent when there is a connection again
+
+def _audience(topic: str) -> Audience:
+    return Audience(int(any(topic == one.topic for one in SHOWN)), 0)

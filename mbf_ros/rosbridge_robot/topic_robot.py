@@ -71,6 +71,10 @@ class TopicRobot:
         """What fails to come; empty if all does."""
         return self._watched.problem()
 
+    def problems(self) -> dict[str, str]:
+        """What is wrong with each topic that must come, and with the robot's transform; empty where nothing is."""
+        return self._watched.problems()
+
     def listen(
         self,
         topics: TopicTable,

@@ -1,4 +1,4 @@
-"""The packages mbf_msgs, nav2_msgs and tf2_msgs as interface files of ROS 2, made of the fields in ``interfaces.txt``.
+"""Message packages without wheels as interface files of ROS 2, made of the fields in ``interfaces.txt``.
 
 Names, types and the order of fields are those of the released packages, so both have the same RIHS01 hashes and speak
 to each other. Of tf2_msgs only TFMessage is here, of nav2_msgs what the node offers, and mbf_msgs has no
@@ -16,7 +16,7 @@ from mbf_ros.messages import nav2_codes
 from mbf_ros.messages.interfaces import Field, fields_of, known_types
 from mbf_ros.messages.mbf_queries import GLOBAL_COSTMAP, LOCAL_COSTMAP
 
-PACKAGES = ("mbf_msgs", "nav2_msgs", "tf2_msgs")
+PACKAGES = ("map_msgs", "mbf_msgs", "mesh_msgs", "nav2_msgs", "tf2_msgs")
 PARTS = {"msg": ("",), "srv": ("_Request", "_Response"), "action": ("_Goal", "_Result", "_Feedback")}
 QUESTIONS = ("CheckPoint", "CheckPose", "CheckPath", "FindValidPose")
 COSTMAPS = {"LOCAL_COSTMAP": LOCAL_COSTMAP, "GLOBAL_COSTMAP": GLOBAL_COSTMAP}

@@ -127,7 +127,7 @@ def test_rosapi_names_topics_services_and_actions(serving, connect):
     assert "/move_base_flex/pause" in ros.get_services()
     assert "/navigate_to_pose" in call(ros, "/rosapi/action_servers", "rosapi/ActionServers")["action_servers"]
     assert ros.get_topic_type("/odom") == "nav_msgs/msg/Odometry"
-    assert ros.get_topics_for_type("nav_msgs/Path") == ["/plan"]
+    assert ros.get_topics_for_type("nav_msgs/Path") == ["/local_plan", "/plan"]
     assert ros.get_nodes() == ["/move_base_flex"]
     assert "/cmd_vel" in ros.get_node_details("/move_base_flex")["publishing"]
     assert ros.get_message_details("geometry_msgs/PoseStamped")["typedefs"][0]["fieldnames"] == ["header", "pose"]

@@ -80,7 +80,7 @@ def test_the_bag_has_standard_messages_in_the_order_of_time(tmp_path):
     }  # fmt: skip
     assert [time for _, time, _ in found] == sorted(time for _, time, _ in found)
     grid = next(one for topic, _, one in found if topic == "/global_costmap/costmap")
-    assert grid.data.tolist() == [0, 50, 100, -1] and grid.info.resolution == 0.5
+    assert grid.data.tolist() == [0, 49, 99, -1] and grid.info.resolution == 0.5
     odometry = [one for topic, _, one in found if topic == "/odom"][7]
     assert odometry.twist.twist.linear.x == log.twists[7, 0] and odometry.pose.pose.position.x == log.poses[7, 0]
     assert (odometry.child_frame_id, odometry.header.frame_id) == ("base", "odom")

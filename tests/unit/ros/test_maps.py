@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from mbf_abstract.maps.view import FieldView, GridView, MeshView
 from mbf_ros.messages import maps
@@ -12,19 +15,60 @@ CONTEXT = MessageContext()
 MESH = MeshView(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.int32([[0, 1, 2]]), np.float32([0.0, 0.5, np.inf]))
 
 
-def test_costs_of_cells_are_percent_and_unknown_is_minus_one():
+def cell_of_nav2(cost):
+    """Cell of an OccupancyGrid for a cost of costmap_2d, as Nav2's costmap publisher has it."""
+    if cost == 255:
+        return -1
+    special = {0: 0, 253: 99, 254: 100}
+    return special.get(cost, 1 + 97 * (cost - 1) // 251)
+
+
+def test_cells_are_those_of_nav2_for_every_cost():
+    costs = np.arange(256, dtype=np.uint8)
+    view = np.divide(costs, np.float32(253), dtype=np.float32)
+    view[255] = np.nan
+    assert maps.occupancy_cells(view[None])[0].tolist() == [cell_of_nav2(int(cost)) for cost in costs]
+
+
+def test_what_is_forbidden_without_a_limit_is_an_obstacle_and_a_slight_cost_is_not_free():
+    assert maps.occupancy_cells(np.float32([[np.inf, 1e-4, -1.0]])).tolist() == [[100, 1, 0]]
+
+
+def test_a_grid_lies_where_its_view_does():
     costs = np.float32([[0.0, 0.5, 1.0], [2.0, np.nan, 0.004]])
     message = maps.occupancy_grid(GridView(costs, (-1.0, 0.5, 2.0, 3.0)), "map", 1.0, CONTEXT)
-    assert message["data"].tolist() == [0, 50, 100, 100, -1, 0]
+    assert message["data"].tolist() == [0, 49, 99, 100, -1, 1]
     info = message["info"]
     assert (info["width"], info["height"], info["resolution"]) == (3, 2, 0.5)
     assert (info["origin"]["position"]["x"], info["origin"]["position"]["y"]) == (-1.0, 2.0)
+
+
+CELLS = arrays(np.int8, (4, 6), elements=st.integers(-1, 2))
+
+
+@given(CELLS, CELLS)
+def test_an_update_of_the_changed_window_makes_one_grid_of_the_other(before, after):
+    window = maps.changed_window(before, after)
+    if window is None:
+        assert (before == after).all()
+        return
+    update = maps.occupancy_grid_update(after, window, "map", 0.0, CONTEXT)
+    shown, (x, y, width, height) = before.copy(), (update[name] for name in ("x", "y", "width", "height"))
+    shown[y : y + height, x : x + width] = update["data"].reshape(height, width)
+    assert (shown == after).all()
+    border = (after != before)[window.y0 : window.y1, window.x0 : window.x1]
+    assert border[0].any() and border[-1].any() and border[:, 0].any() and border[:, -1].any()
 
 
 @pytest.mark.parametrize(
     ("kind", "message"),
     [
         ("nav_msgs/OccupancyGrid", maps.occupancy_grid(GridView(np.zeros((2, 3)), (0, 3, 0, 2)), "map", 0.0, CONTEXT)),
+        (
+            "map_msgs/OccupancyGridUpdate",
+            maps.occupancy_grid_update(np.zeros((2, 3), np.int8), maps.CellWindow(0, 0, 3, 1), "map", 0.0, CONTEXT),
+        ),
+        ("geometry_msgs/PolygonStamped", maps.polygon(np.zeros((3, 3)), "map", 0.0, CONTEXT)),
         ("mesh_msgs/MeshGeometryStamped", maps.mesh_geometry(MESH, "id", "map", 0.0, CONTEXT)),
         ("mesh_msgs/MeshVertexCostsStamped", maps.mesh_costs(MESH, "id", "layer", "map", 0.0, CONTEXT)),
         ("visualization_msgs/MarkerArray", maps.mesh_markers(MESH, "map", 0.0, CONTEXT)),
