@@ -94,7 +94,7 @@ class LiveServer:
         report_addresses(self._options, self.port, self._note, title)
 
     def close(self) -> None:
-        """Send the last part and listen no more; idempotent."""
+        """Send the last part and listen no more."""
         self._send_part()
         self._feed.close()
         self._server.close()
