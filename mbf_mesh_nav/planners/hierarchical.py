@@ -1,8 +1,8 @@
 """Cheapest path along edges on a map larger than memory: coarse over the portals of its tiles, then exact near it.
 
 Use it on the backend ``tiles``, it is the planner there. Costs are those of ``mesh.astar`` on the whole mesh, or above
-them by at most ``cost_tolerance`` where that can be proven; the message states which, see ``tiles.planning``. Blocked
-is what the map's cost profile calls so. Paths follow edges: see ``mesh.dijkstra``.
+them by at most ``cost_tolerance`` where that can be proven; the message states which, see ``tiles.corridor_search``.
+Blocked is what the map's cost profile calls so, or what sensors have seen. Paths follow edges: see ``mesh.dijkstra``.
 """
 
 from __future__ import annotations
@@ -27,15 +27,9 @@ from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner, p
 from mbf_mesh_nav.mesh.topology import group_of_each
 from mbf_mesh_nav.search.leg_search import Leg
 from mbf_mesh_nav.search.surface_planner import named_poses, path_of_legs
+from mbf_mesh_nav.tiles.corridor_search import TiledPlan, failed_plan
 from mbf_mesh_nav.tiles.places import TilePlace
-from mbf_mesh_nav.tiles.planning import (
-    SURFACE_DISTANCE,
-    TOLERANCE,
-    TiledPlan,
-    failed_plan,
-    place_on_tiles,
-    plan_between,
-)
+from mbf_mesh_nav.tiles.planning import SURFACE_DISTANCE, TOLERANCE, place_on_tiles, plan_between
 from mbf_mesh_nav.tiles.serving.navigation_map import SEARCHED, TiledNavigationMap
 
 AT_VERTEX = 1e-6

@@ -16,7 +16,7 @@ from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.view import GridView
-from mbf_mesh_nav.arrays import FlagArray
+from mbf_mesh_nav.arrays import FlagArray, FloatArray
 from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
@@ -162,6 +162,10 @@ class TiledNavigationMap(LayeredMap):
         """Heights of all surfaces at a place, the lowest free one first; see ``ground.ground_heights``."""
         there = self.around(x, y, self.inscribed_radius)
         return () if there is None else ground_heights(there, x, y)
+
+    def heights_below(self, points: FloatArray) -> FloatArray | None:
+        """As on one mesh, but also nan out of the window; None without one."""
+        return None if self._window is None else self._window.now.map.heights_below(points)
 
     # -------------------------------------------------------------------------------------------------- places
     def point_check(self) -> PlaceCheck:

@@ -13,7 +13,7 @@ from tiled_terrains import PARAMETERS, SPACING, WholeMap, settings, terrain
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.tiles import planning, pool
+from mbf_mesh_nav.tiles import corridor_search, pool
 from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
 from mbf_mesh_nav.tiles.index import CostProfile
 from mbf_mesh_nav.tiles.planning import plan_on_tiles
@@ -53,7 +53,7 @@ def test_a_plan_costs_at_most_three_percent_more_than_the_exact_one_and_never_le
 
 @pytest.mark.parametrize("margin", [0.0, 0.5])
 def test_what_is_opened_at_first_does_not_matter(tiled_hills, whole_hills, monkeypatch, margin):
-    monkeypatch.setattr(planning, "FIRST_MARGIN", margin)
+    monkeypatch.setattr(corridor_search, "FIRST_MARGIN", margin)
     tiled = TiledMap(tiled_hills)
     for start, goal in whole_hills.free_places(16, 3).reshape(-1, 2, 3):
         assert_near_exact(plan_on_tiles(tiled, start, goal), whole_hills.cost(start, goal))
@@ -104,7 +104,7 @@ def test_the_least_recently_used_tiles_go_and_the_result_states_what_is_not_prov
         if np.isfinite(plan.cost):
             assert exact * (1.0 - ROUNDING) <= plan.cost <= (1.0 + plan.gap) * exact * (1.0 + ROUNDING)
         if plan.gap > 0.03:
-            assert plan.message.endswith("; the memory holds 6 of 16 tiles") or plan.gain <= planning.STEADY
+            assert plan.message.endswith("; the memory holds 6 of 16 tiles") or plan.gain <= corridor_search.STEADY
             bounded += 1
         if plan.outcome == GetPathOutcome.NO_PATH_FOUND and np.isfinite(exact):
             assert "the memory holds 6 of 16 tiles" in plan.message
@@ -119,7 +119,7 @@ def test_where_bounds_prove_nothing_a_wider_corridor_is_compared_and_costs_are_w
     tiled, whole, compared = open_with_slots(tmp_path / "map", 40), WholeMap(heights), 0
     for start, goal in whole.free_places(40, 2).reshape(-1, 2, 3):
         plan, exact = plan_on_tiles(tiled, start, goal), whole.cost(start, goal)
-        if plan.gap > 0.03 and plan.gain <= planning.STEADY:
+        if plan.gap > 0.03 and plan.gain <= corridor_search.STEADY:
             assert "not proven, but at most 0.5 % cheaper than in a narrower corridor" in plan.message
             assert exact * (1.0 - ROUNDING) <= plan.cost <= 1.03 * exact
             compared += 1
@@ -127,10 +127,12 @@ def test_where_bounds_prove_nothing_a_wider_corridor_is_compared_and_costs_are_w
 
 
 def test_only_a_corridor_with_other_portals_is_compared(tiled_hills, whole_hills, monkeypatch):
-    corridors, exact = [], planning._Search._exact
-    monkeypatch.setattr(planning, "FIRST_MARGIN", 1e-6)
-    monkeypatch.setattr(planning, "LEAST_WIDENING", 0.0)
-    monkeypatch.setattr(planning._Search, "_exact", lambda *args: corridors.append(args[1]) or exact(*args))
+    corridors, exact = [], corridor_search.CorridorSearch._exact
+    monkeypatch.setattr(corridor_search, "FIRST_MARGIN", 1e-6)
+    monkeypatch.setattr(corridor_search, "LEAST_WIDENING", 0.0)
+    monkeypatch.setattr(
+        corridor_search.CorridorSearch, "_exact", lambda *args: corridors.append(args[1]) or exact(*args)
+    )
     tiled, compared = open_with_slots(tiled_hills, 8), 0
     for start, goal in whole_hills.free_places(20, 4).reshape(-1, 2, 3):
         corridors.clear()
@@ -144,18 +146,18 @@ def test_a_map_without_memory_for_a_wider_corridor_compares_nothing(tiled_hills,
     tiled = open_with_slots(tiled_hills, 3)
     for start, goal in whole_hills.free_places(20, 4).reshape(-1, 2, 3):
         plan = plan_on_tiles(tiled, start, goal, tolerance=0.0)
-        assert ("narrower" in plan.message) == (plan.gain <= planning.STEADY and plan.gap > 0.0), plan.message
+        assert ("narrower" in plan.message) == (plan.gain <= corridor_search.STEADY and plan.gap > 0.0), plan.message
 
 
 def test_a_path_is_not_lost_to_a_wider_corridor_that_has_to_leave_out_its_tiles(tiled_hills, whole_hills, monkeypatch):
-    found, exact = [], planning._Search._exact
+    found, exact = [], corridor_search.CorridorSearch._exact
 
     def only_the_ends(search, corridor, ranks, margin):
         ends = tuple(sorted({place.key for place in search._ends}))
-        return planning._Corridor(np.zeros_like(corridor.is_open), ends, True), margin
+        return corridor_search._Corridor(np.zeros_like(corridor.is_open), ends, True), margin
 
-    monkeypatch.setattr(planning._Search, "_exact", lambda *args: found.append(exact(*args)) or found[-1])
-    monkeypatch.setattr(planning._Search, "_widened", only_the_ends)
+    monkeypatch.setattr(corridor_search.CorridorSearch, "_exact", lambda *args: found.append(exact(*args)) or found[-1])
+    monkeypatch.setattr(corridor_search.CorridorSearch, "_widened", only_the_ends)
     tiled, lost = TiledMap(tiled_hills), 0
     for start, goal in whole_hills.free_places(20, 4).reshape(-1, 2, 3):
         found.clear()
@@ -262,8 +264,10 @@ def test_storeys_are_kept_apart_at_the_borders_of_tiles(tmp_path):
 
 
 def test_a_start_and_a_goal_in_one_portal_of_two_storeys_have_no_path(tmp_path, monkeypatch):
-    corridors, exact = [], planning._Search._exact
-    monkeypatch.setattr(planning._Search, "_exact", lambda *args: corridors.append(args[1]) or exact(*args))
+    corridors, exact = [], corridor_search.CorridorSearch._exact
+    monkeypatch.setattr(
+        corridor_search.CorridorSearch, "_exact", lambda *args: corridors.append(args[1]) or exact(*args)
+    )
     tiled = build_storeys(tmp_path / "map", portal_length=10.0)
     plan = plan_on_tiles(tiled, (10.0, 2.0, 0.0), (10.0, 2.0, 3.0))
     assert plan.outcome == GetPathOutcome.NO_PATH_FOUND and len(plan.tiles) == 4
