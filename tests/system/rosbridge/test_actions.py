@@ -207,8 +207,8 @@ def test_a_hundred_goals_leave_nothing_behind(serving, connect, send):
         goal = send(ros, "/move_base_flex/get_path", "mbf_msgs/action/GetPath", {"target_pose": target(0.3)})
         assert goal.result()[0] == SUCCEEDED
     assert session.server.get_path.unfinished == []
-    assert server._bridge.actions._running["/move_base_flex/get_path"] == []
-    (client,) = server._clients
+    assert server._service.actions._running["/move_base_flex/get_path"] == []
+    (client,) = server._visitors
     assert client.goals == {}
 
 
