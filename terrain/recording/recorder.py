@@ -7,7 +7,7 @@ Use one per run, on one thread: the runner's, which steps the simulator. Give it
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Sized
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -17,15 +17,18 @@ from numpy.typing import ArrayLike
 from mbf_abstract.event_values import well_formed
 from mbf_abstract.events import Event
 from mbf_abstract.geometry import Command, FloatArray, Pose, Twist
+from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.maps.view import GridView, MapView, MeshView
 from terrain.physics.protocols import Actor
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorded_maps import RecordedGrid, RecordedMesh, add_if_changed
+from terrain.recording.recorded_objects import RecordedObjects
 from terrain.recording.recording import Recording, RobotShape, StampedPoints
 from terrain.recording.verdict import UNFINISHED, Verdict
 from terrain.worlds.surface import Surface
 
 MAP_PERIOD = 5.0  # s at least between two looks at the map
+OBJECTS_PERIOD = 0.2  # s at least between two looks at what moves
 MAX_GRID_CELLS = 4_000_000  # larger maps are not recorded
 MAX_MESH_VERTICES = 1_000_000  # nor are these
 MAX_MAP_COSTS = 200_000_000  # of all maps of a run together, a byte or two each; later ones are not recorded
@@ -39,6 +42,7 @@ class Taken(NamedTuple):
     scans: int = 0
     grids: int = 0
     meshes: int = 0
+    objects: int = 0
 
 
 @dataclass(eq=False)
@@ -71,10 +75,12 @@ class Recorder:
     scan_origins: list[FloatArray] = field(default_factory=list)
     grids: list[RecordedGrid] = field(default_factory=list)
     meshes: list[RecordedMesh] = field(default_factory=list)
+    objects: list[RecordedObjects] = field(default_factory=list)
     actors: Sequence[Actor] = ()
     map_budget: int = MAX_MAP_COSTS
     _actor_poses: list[list[list[float]]] = field(default_factory=list)
     _next_map: float = -math.inf
+    _next_objects: float = -math.inf
     _samples: list[list[float]] = field(default_factory=list)
     _taken: Taken = field(default_factory=Taken)
 
@@ -106,6 +112,18 @@ class Recorder:
         elif isinstance(view, MeshView) and view.costs.size <= MAX_MESH_VERTICES:
             add_if_changed(self.meshes, time, view)
 
+    def tracked(self, time: float, look: Callable[[], Iterable[TrackedObject]]) -> None:
+        """Add the objects that the robot knows of now, in the map, unless that was looked at just before.
+
+        That there are none is added once, after the last ones.
+        """
+        if time < self._next_objects:
+            return
+        self._next_objects = time + OBJECTS_PERIOD
+        found = RecordedObjects.of(time, look())
+        if len(found.rows) or (self.objects and len(self.objects[-1].rows)):
+            self.objects.append(found)
+
     def finish(self, verdict: Verdict = UNFINISHED, events: Sequence[Event] = (), began: float = 0.0) -> Recording:
         """Return what was recorded; ``began`` [s] is the events' time at which the samples' time was 0."""
         return self._recording(Taken(), self._all(), verdict, events, began)
@@ -124,7 +142,8 @@ class Recorder:
         return self._recording(before, now, UNFINISHED, events, began), now
 
     def _all(self) -> Taken:
-        return Taken(len(self._samples), len(self.paths), len(self.scan_origins), len(self.grids), len(self.meshes))
+        kept: tuple[Sized, ...] = (self._samples, self.paths, self.scan_origins, self.grids, self.meshes, self.objects)
+        return Taken(*map(len, kept))
 
     def _recording(
         self, before: Taken, now: Taken, verdict: Verdict, events: Sequence[Event], began: float
@@ -158,6 +177,7 @@ class Recorder:
             grids=self.grids[before.grids : now.grids],
             meshes=meshes,
             actors=self._actor_tracks(before.samples, now.samples),
+            objects=self.objects[before.objects : now.objects],
         )
 
     def actor_tracks(self) -> list[ActorTrack]:

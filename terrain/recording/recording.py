@@ -30,6 +30,7 @@ from terrain.recording.recorded_maps import (
     mesh_arrays,
     meshes_from,
 )
+from terrain.recording.recorded_objects import RecordedObjects, object_arrays, objects_from
 from terrain.recording.verdict import Verdict
 from terrain.worlds.surface import Surface
 
@@ -113,6 +114,8 @@ class Recording:
         The same where it is a mesh.
     actors : list of ActorTrack
         What moved by itself.
+    objects : list of RecordedObjects
+        What the robot knew of that, a few times a second; nothing of runs without a layer that tracks objects.
     """
 
     scenario: str
@@ -134,6 +137,7 @@ class Recording:
     grids: list[RecordedGrid] = field(default_factory=list)
     meshes: list[RecordedMesh] = field(default_factory=list)
     actors: list[ActorTrack] = field(default_factory=list)
+    objects: list[RecordedObjects] = field(default_factory=list)
     scan_origins: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
     @cached_property
@@ -158,6 +162,7 @@ class Recording:
             arrays |= _stamped_arrays(name, getattr(self, name))
         arrays["scan_origins"] = self.scan_origins
         arrays |= grid_arrays(self.grids) | mesh_arrays(self.meshes) | track_arrays(self.actors)
+        arrays |= object_arrays(self.objects)
         metadata: dict[str, Any] = {
             "scenario": self.scenario,
             "backend": self.backend,
@@ -239,5 +244,6 @@ def _recording_from(arrays: dict[str, Any]) -> Recording:
         grids=grids_from(arrays),
         meshes=meshes_from(arrays),
         actors=tracks_from(arrays),
+        objects=objects_from(arrays),
         scan_origins=arrays.get("scan_origins", np.zeros((0, 3))),
     )

@@ -24,8 +24,11 @@ from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.config.yaml_source import read_yaml
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.tracking.objects import TrackedObject
+from mbf_abstract.server.map_server import MapServer
 from terrain.description.placeholders import fill_in
 from terrain.physics.actors import Fellow
 from terrain.physics.command_delay import CommandDelay
@@ -190,6 +193,16 @@ class Session(SimulationSession):
 
     def _record_sample(self, time: float, pose: Pose, velocity: Twist) -> None:
         self.recorder.sample(time, pose, velocity, self.navigator.server.runtime.gate.last_command)
+        self.recorder.tracked(time, self._tracked_objects)
+
+    def _tracked_objects(self) -> list[TrackedObject]:
+        """What the map knows that the robot drives on, without starting its updates; in the frame of the world."""
+        server, world = self.navigator.server, self.recorder.start.frame_id
+        known = list(server.served.values())[-1].tracked_objects() if isinstance(server, MapServer) else ()
+        try:
+            return [one.seen_from(server.runtime.transforms.lookup(world, one.frame_id)) for one in known]
+        except TransformError:
+            return []
 
     def _record_scan(self, scan: RangeScan) -> None:
         self._scans += 1

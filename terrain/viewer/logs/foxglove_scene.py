@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
+from foxglove_schemas_protobuf.ArrowPrimitive_pb2 import ArrowPrimitive
 from foxglove_schemas_protobuf.CylinderPrimitive_pb2 import CylinderPrimitive
+from foxglove_schemas_protobuf.KeyValuePair_pb2 import KeyValuePair
 from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
+from foxglove_schemas_protobuf.SceneEntityDeletion_pb2 import SceneEntityDeletion
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from foxglove_schemas_protobuf.SpherePrimitive_pb2 import SpherePrimitive
 from foxglove_schemas_protobuf.TextPrimitive_pb2 import TextPrimitive
@@ -16,9 +20,10 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.recording.actor_track import ActorTrack
+from terrain.recording.recorded_objects import RecordedObjects
 from terrain.recording.recording import Recording, RobotShape
 from terrain.viewer.logs.foxglove_messages import colour, points, pose, timestamp, triangles
-from terrain.viewer.pictures.colours import ACTORS, BODY, DRIVEN, WHEEL, Colour
+from terrain.viewer.pictures.colours import ACTORS, BODY, DRIVEN, TRACKED, WHEEL, Colour
 from terrain.viewer.pictures.shading import vertex_colours
 from terrain.viewer.pictures.shapes import marks, robot_body, standing_things
 from terrain.worlds.surface import Surface
@@ -28,6 +33,7 @@ ALONG_Y = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])  # a quarter turn abo
 BALL = 0.4  # m
 TEXT = 18.0  # pixels
 TRACK_WIDTH = 4.0  # pixels
+LIFT, SHAFT, HEAD = 0.05, 0.05, 0.2  # m; of tracked objects and their arrows
 
 
 def world(recording: Recording) -> SceneUpdate:
@@ -94,6 +100,42 @@ def track_piece(frame: str, number: int, time: float, line: FloatArray) -> Scene
         )
     )
     return SceneUpdate(entities=[entity])
+
+
+def tracked_objects(frame: str, known: RecordedObjects) -> SceneUpdate:
+    """A flat disc for each object, and for those that move an arrow to where they will be in a second."""
+    stamp = timestamp(known.time)
+    before = SceneEntityDeletion(type=SceneEntityDeletion.ALL, timestamp=stamp)
+    return SceneUpdate(deletions=[before], entities=[_object(frame, known.time, row) for row in known.rows])
+
+
+def _object(frame: str, time: float, row: FloatArray) -> SceneEntity:
+    number, x, y, z, vx, vy, radius, age, is_moving = row.tolist()
+    entity, middle = _entity(frame, f"object {number:.0f}"), np.array([x, y, z + LIFT])
+    entity.timestamp.CopyFrom(timestamp(time))
+    facts = {"motion": "moving" if is_moving else "standing", "vx": f"{vx:.3f}", "vy": f"{vy:.3f}", "age": f"{age:.2f}"}
+    entity.metadata.extend(KeyValuePair(key=key, value=value) for key, value in facts.items())
+    size = Vector3(x=2.0 * radius, y=2.0 * radius, z=LIFT)
+    paint = colour(TRACKED)
+    entity.cylinders.append(
+        CylinderPrimitive(pose=pose(middle, UPRIGHT), size=size, bottom_scale=1.0, top_scale=1.0, color=paint)
+    )
+    speed = math.hypot(vx, vy)
+    if speed > 0.0:
+        half = 0.5 * math.atan2(vy, vx)
+        ahead = pose(middle, np.array([0.0, 0.0, math.sin(half), math.cos(half)]))
+        head = min(HEAD, 0.5 * speed)
+        entity.arrows.append(
+            ArrowPrimitive(
+                pose=ahead,
+                shaft_length=speed - head,
+                shaft_diameter=SHAFT,
+                head_length=head,
+                head_diameter=3.0 * SHAFT,
+                color=paint,
+            )
+        )
+    return entity
 
 
 def _entity(frame: str, name: str) -> SceneEntity:

@@ -13,6 +13,7 @@ topic      schema                           contents
 /events    mbf.Event                        events as in events.jsonl
 /actions   mbf.ActionStates                 what each action does
 /motion    mbf.Motion                       speed, yaw rate, their commands, tilt, cross-track error
+/objects   foxglove.SceneUpdate             what the robot knows of things that move, with velocities
 ========== ================================ =====================================================
 
 ``RunMessages`` makes them of a recording, whole (run.mcap) or part by part while the run goes on (live).
@@ -64,6 +65,7 @@ TOPICS: dict[str, Any] = {
     "/scan": PointCloud,
     "/map": Grid,
     "/mesh_map": SceneUpdate,
+    "/objects": SceneUpdate,
     "/log": Log,
     "/events": "mbf.Event",
     "/actions": "mbf.ActionStates",
@@ -150,6 +152,7 @@ class RunMessages:
             self._plans(part),
             self._seen(part),
             self._maps(part),
+            self._objects(part),
             self._events(part.events),
             self._motion(part),
         ]
@@ -191,6 +194,10 @@ class RunMessages:
         for mesh in part.meshes:
             drawn, make = self._mesh.take(mesh)
             yield Stamped(mesh.time, "/mesh_map", make, drawn)
+
+    def _objects(self, part: Recording) -> Iterator[Stamped]:
+        for known in part.objects:
+            yield Stamped(known.time, "/objects", partial(scene.tracked_objects, self._frame, known), part="")
 
     def _events(self, events: Iterable[Event]) -> Iterator[Stamped]:
         for event in events:

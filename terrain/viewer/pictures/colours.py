@@ -28,6 +28,8 @@ WHEEL: Colour = (40, 40, 44)
 FLEET: tuple[Colour, ...] = (DRIVEN, (20, 120, 200), (40, 150, 70), (160, 60, 170), (150, 110, 30), (200, 50, 110))
 """Tracks of several robots; a seventh one begins anew."""
 ACTORS: dict[str, Colour] = {"person": (150, 60, 190), "door": (120, 90, 60), "robot": (0, 140, 160)}
+TRACKED: Colour = (0, 205, 235)
+"""What the robot knows of things that move; what they are in truth has the colours of ``ACTORS``."""
 
 GOOD, WARNING, BAD, NEITHER = "#1a7f37", "#9a6700", "#cf222e", "#6b7280"  # of texts, as CSS has them
 LEVELS = {Level.SUCCESS: GOOD, Level.ARRIVED: WARNING, Level.FAILED: BAD}

@@ -16,7 +16,7 @@ import numpy as np
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import SYMBOLS
 from terrain.recording.recording import Recording
-from terrain.viewer.pictures.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, SCAN, Colour, slope_legend
+from terrain.viewer.pictures.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, SCAN, TRACKED, Colour, slope_legend
 from terrain.viewer.pictures.incident_marks import mark_of
 from terrain.viewer.pictures.shading import FLAT_GROUND
 from terrain.viewer.reports.event_lines import is_shown, line_of
@@ -103,6 +103,8 @@ def legend_of(recording: Recording, robots: Sequence[tuple[str, Colour]] = ()) -
         entries = [Entry("plan", PLANNED, "dash"), Entry("driven", DRIVEN, "line")]
     if recording.scans:
         entries.append(Entry("seen by a sensor", SCAN))
+    if recording.objects:
+        entries.append(Entry("velocity that the robot knows", TRACKED, "line"))
     if recording.obstacles is not None:
         entries.append(Entry("on no map", OBSTACLE))
     entries += [Entry(thing, ACTORS[thing]) for thing in sorted({track.thing for track in recording.actors})]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.event_values import well_formed
 from mbf_abstract.geometry import FloatArray
+from terrain.recording.recorded_objects import IS_MOVING, VX, VY, X, Y, Z
 from terrain.recording.recording import Recording, StampedPoints
 from terrain.viewer.pictures.colours import (
     BODY,
@@ -21,6 +22,7 @@ from terrain.viewer.pictures.colours import (
     SCAN,
     SLOPE_COLOURS,
     SLOPE_STOPS,
+    TRACKED,
     Colour,
 )
 from terrain.viewer.pictures.shading import LIGHT
@@ -39,6 +41,8 @@ MAX_PLAN_POINTS = 200_000  # of all plans of a robot; they take 16 bytes each in
 LEAST_STEP = 0.1  # m between two points of a plan; larger where the plans have too many
 LEAST_RELIEF = 2.0  # m; lower ground has no contour lines
 CONTOURS = 12  # about so many on all of the relief
+ARROW_HEIGHT = 1.8  # m above the ground, over the heads of people; of velocities of tracked objects
+BARB = 0.3  # of the arrow's length
 CONTOUR_STEPS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # m
 
 
@@ -136,6 +140,7 @@ def _looks(mesh: WorldMesh) -> dict[str, Any]:
         "stops": SLOPE_STOPS.tolist(),
         "contour": contour_step(float(mesh.size[2])),
         "scan": SCAN,
+        "tracked": TRACKED,
     }
 
 
@@ -146,6 +151,7 @@ def _robot(
     angles = wheel_angles(shape, recording.times, twists)
     scans = recording.scans[:: -(-len(recording.scans) // MAX_SCANS)] if recording.scans else []
     scans = [(time, points[:: max(1, len(points) // MAX_SCAN_POINTS)]) for time, points in scans]
+    known = recording.objects[:: -(-len(recording.objects) // MAX_FRAMES) or 1]
     plans = thinned_plans(seen_plans(recording.paths, recording.times[frames]))
     return {
         "name": well_formed(looks.name),
@@ -161,7 +167,22 @@ def _robot(
         "plans": _sets(packer, plans, origin, begin),
         "scans": _sets(packer, scans, origin, begin),
         "scanHold": scan_hold([time for time, _ in scans]),
+        "objects": _sets(packer, [(one.time, velocity_arrows(one.rows)) for one in known], origin, begin),
     }
+
+
+def velocity_arrows(rows: FloatArray) -> FloatArray:
+    """Ends (6 k, 3) [m] of three lines for each of k moving objects: to where it will be in a second, and two barbs.
+
+    ``rows`` are those of ``RecordedObjects``; those that stand have no arrow.
+    """
+    moving = rows[rows[:, IS_MOVING] > 0.0]
+    ahead = np.column_stack([moving[:, [VX, VY]], np.zeros(len(moving))])
+    aside = np.column_stack([-ahead[:, 1], ahead[:, 0], ahead[:, 2]])
+    middle = moving[:, [X, Y, Z]] + (0.0, 0.0, ARROW_HEIGHT)
+    tip = middle + ahead
+    barbs = [tip - BARB * ahead + side * 0.5 * BARB * aside for side in (1.0, -1.0)]
+    return np.asarray(np.stack([middle, tip, barbs[0], tip, barbs[1], tip], axis=1).reshape(-1, 3))
 
 
 def _actor(packer: Packer, track: Any, frames: NDArray[np.intp], origin: FloatArray) -> dict[str, Any]:

@@ -12,9 +12,11 @@ from mcap_protobuf.decoder import DecoderFactory as ProtobufDecoderFactory
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.maps.view import GridView, MeshView
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.actor_track import ActorTrack
+from terrain.recording.recorded_objects import RecordedObjects
 from terrain.recording.recorder import MAP_PERIOD, Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
@@ -182,6 +184,25 @@ def test_a_run_on_a_mesh_keeps_the_costs_it_was_planned_on(meadow):
     assert len(recorded) == 1
     np.testing.assert_array_equal(recorded[0].faces, view.faces)
     np.testing.assert_allclose(recorded[0].costs, view.costs, rtol=1e-3, atol=1e-3)
+
+
+def test_what_the_robot_knows_of_things_that_move_is_shown_until_it_knows_of_none(office, tmp_path):
+    walks = TrackedObject(7, Motion.MOVING, 1.0, 2.0, 0.0, 0.0, 0.6, 0.25, 0.05, 0.1, 3.0, 0.0, 0.0, 0.0, "map")
+    stands = replace(walks, number=9, x=4.0, vy=0.0, motion=Motion.PARKED)
+    office.objects.extend([RecordedObjects.of(0.4, [walks, stands]), RecordedObjects.of(1.4, [])])
+    write_mcap(tmp_path / "objects.mcap", office)
+
+    shown, gone = Log(tmp_path / "objects.mcap")["/objects"]
+
+    moving, parked = shown.entities
+    assert (moving.id, moving.frame_id) == ("object 7", "map")
+    (arrow,) = moving.arrows
+    assert arrow.shaft_length + arrow.head_length == pytest.approx(0.6)
+    assert (arrow.pose.orientation.z, arrow.pose.orientation.w) == pytest.approx((np.sqrt(0.5), np.sqrt(0.5)))
+    facts = {pair.key: pair.value for pair in moving.metadata}
+    assert facts == {"motion": "moving", "vx": "0.000", "vy": "0.600", "age": "3.00"}
+    assert not parked.arrows and parked.cylinders[0].size.x == 0.5
+    assert [deletion.type for deletion in gone.deletions] == [1] and not gone.entities, "1 = all of the topic"
 
 
 def test_events_and_the_log_hold_what_events_jsonl_holds(log, office):

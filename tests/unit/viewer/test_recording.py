@@ -1,5 +1,6 @@
 """What is recorded comes back from the file, and what is derived is right."""
 
+import json
 import math
 
 import numpy as np
@@ -7,12 +8,16 @@ import pytest
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
+from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.maps.view import GridView, MeshView
 from terrain.physics.motion_sample import Thing
 from terrain.physics.robot_models import CAR, HUSKY, TURTLEBOT
-from terrain.recording.recorder import MAP_PERIOD, MAX_GRID_CELLS, MAX_MESH_VERTICES, Recorder
+from terrain.recording.recorded_objects import AGE, IS_MOVING, NUMBER, VX, X, Y
+from terrain.recording.recorder import MAP_PERIOD, MAX_GRID_CELLS, MAX_MESH_VERTICES, OBJECTS_PERIOD, Recorder
 from terrain.recording.recording import Recording, RecordingError, RobotShape
 from terrain.recording.verdict import Verdict
+from terrain.scenarios.scenario import load_scenario
+from terrain.session.session import Session, SessionOptions
 from terrain.worlds.surface import cylinder
 
 
@@ -169,6 +174,53 @@ def test_what_moves_by_itself_is_recorded_with_every_sample_and_comes_back(tmp_p
     np.testing.assert_array_equal(track.poses[:, :3], [[0.5, 2.0, 0.85], [1.0, 2.0, 0.85], [1.5, 2.0, 0.85]])
     np.testing.assert_array_equal(track.vertices, Pacer.looks[0])
     np.testing.assert_array_equal(track.faces, Pacer.looks[1])
+
+
+def tracked(number, x, vx, motion=Motion.MOVING):
+    return TrackedObject(number, motion, x, 2.0, 0.0, vx, 0.0, 0.25, 0.05, 0.1, 3.0, 0.0, 0.0, 0.0, "map")
+
+
+def test_what_the_robot_knows_of_things_that_move_is_recorded_and_comes_back(tmp_path):
+    recorder = Recorder("known", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), [])
+    looks = [[], [tracked(7, 1.0, 0.5), tracked(9, 4.0, 0.0, Motion.PARKED)], [tracked(7, 1.1, 0.5)], [], []]
+    for index, known in enumerate(looks):
+        recorder.tracked(OBJECTS_PERIOD * index, lambda known=known: known)
+    recorder.tracked(OBJECTS_PERIOD * index + 0.01, lambda: pytest.fail("looked again at once"))
+    recorder.finish(Verdict(0, "")).save(tmp_path / "recording.npz")
+
+    found = Recording.load(tmp_path / "recording.npz").objects
+
+    assert [(round(one.time, 3), one.rows[:, NUMBER].tolist()) for one in found] == [
+        (0.2, [7, 9]),
+        (0.4, [7]),
+        (0.6, []),
+    ]
+    np.testing.assert_array_equal(
+        found[0].rows[:, [X, VX, AGE, IS_MOVING]], [[1.0, 0.5, 3.0, 1.0], [4.0, 0.0, 3.0, 0.0]]
+    )
+
+
+def test_a_session_records_what_its_map_tracks():
+    types = {"obstacles": "obstacle", "moving": "moving_obstacles", "inflation": "inflation"}
+    layers = json.dumps([{"name": name, "type": kind} for name, kind in types.items()])
+    settings = {"local_costmap.layers": layers, "local_costmap.moving": "{sources: [lidar]}"}
+    walks = load_scenario("crowded_corridor")
+    with Session(walks.model_copy(update={"actors": walks.actors[:1]}), SessionOptions(settings=settings)) as session:
+        session.clock.sleep(4.0)
+        (person,), known = session.world.actors, session.recorder.objects
+
+    assert np.diff([one.time for one in known]).min() >= OBJECTS_PERIOD - 1e-6
+    row = known[-1].rows[0]
+    assert math.dist(row[[X, Y]], (person.pose().x, person.pose().y)) < 0.4
+    assert row[[VX, IS_MOVING]].tolist() == pytest.approx([person.velocity()[0], 1.0], abs=0.25)
+
+
+def test_parts_of_a_recording_have_their_own_objects():
+    recorder = Recorder("known", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), [])
+    recorder.tracked(0.0, lambda: [tracked(1, 1.0, 0.5)])
+    assert len(recorder.take().objects) == 1
+    recorder.tracked(1.0, lambda: [tracked(1, 1.5, 0.5)])
+    assert [one.time for one in recorder.take().objects] == [1.0]
 
 
 def test_events_of_a_real_clock_are_brought_to_the_time_of_the_samples():

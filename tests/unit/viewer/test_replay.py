@@ -14,9 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.joint_recording import JointRecording
+from terrain.recording.recorded_objects import RecordedObjects
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
@@ -186,6 +188,22 @@ def test_people_doors_and_other_robots_move_through_the_replay(hill_recording, c
     body, arrow, eyes = (arrays[part["corners"]] / 1e3 for part in actor["parts"])
     assert arrow[:, 0].min() > 0.25 and arrow[:, 2].max() < -0.7, "on the floor, before the body"
     assert len(body) == 3 * 4 * 24 and eyes[:, 0].max() > 0.25
+
+
+def test_what_the_robot_knows_to_move_has_an_arrow_in_the_replay_and_what_stands_has_none(hill_recording, contents_of):
+    walks = TrackedObject(7, Motion.MOVING, 3.0, 2.0, 0.5, 0.0, 0.8, 0.25, 0.05, 0.1, 3.0, 0.0, 0.0, 0.0, "map")
+    stands = replace(walks, number=8, vy=0.0, motion=Motion.WAITING)
+    known = [RecordedObjects.of(1.0, [walks, stands]), RecordedObjects.of(2.0, [stands]), RecordedObjects.of(3.0, [])]
+
+    scene, arrays = contents_of(replay_html(replace(hill_recording, objects=known)))
+
+    objects = scene["robots"][0]["objects"]
+    assert arrays[objects["times"]][:, 0].tolist() == [1000, 2000, 3000]
+    assert arrays[objects["counts"]][:, 0].tolist() == [6, 0, 0], "a shaft and two barbs"
+    points = arrays[objects["points"]] / 1e3 + hill_recording.ground.vertices.min(axis=0)
+    np.testing.assert_allclose(points[1] - points[0], [0.0, 0.8, 0.0], atol=1e-3)
+    np.testing.assert_allclose(points[[3, 5]], points[[1, 1]], atol=1e-3)
+    assert points[2, 0] < points[0, 0] < points[4, 0]
 
 
 def test_all_robots_of_a_run_are_in_its_replay_each_in_its_colour_with_path_and_track(two_robots, contents_of):

@@ -1,6 +1,7 @@
-// Plans, driven tracks and what sensors see. Plans are wide and dashed, tracks narrow and solid: no colour is needed to
-// know one from the other. What is hidden behind something is drawn once more, faint.
+// Plans, driven tracks, what sensors see, and the velocities of what the robot knows to move. Plans are wide and dashed,
+// tracks narrow and solid: no colour is needed to know one from the other. What is hidden behind something is drawn once more, faint.
 const PLAN = {width: 7, lift: 0.12}, TRACK = {width: 3.5, lift: 0.16};  // pixels; m above the ground and its bumps
+const ARROW = {width: 4, lift: 0};
 const BORDER = 1.5;  // pixels
 const DASH_PIXELS = 26;
 const HIDDEN = 0.25;
@@ -15,12 +16,20 @@ class Lines {
     this.robots = scene.robots.map(robot => ({
       colour: paintOf(robot.ring), planned: paintOf(robot.plan), track: this.track(fromMilli(arrays[robot.positions])),
       plans: this.sets(robot.plans, arrays, points => withLengths(points)),
-      scans: {...this.sets(robot.scans, arrays, points => points), hold: robot.scanHold}}));
+      scans: {...this.sets(robot.scans, arrays, points => points), hold: robot.scanHold},
+      objects: this.sets(robot.objects, arrays, points => withLengths(points))}));
+    this.tracked = paintOf(scene.tracked);
   }
 
   line(buffer, first) {
     const gl = this.drawing.gl;
     return this.drawing.layout(buffer, 16, [[0, 4, gl.FLOAT, false, 16 * first], [1, 4, gl.FLOAT, false, 16 * (first + 1)]], 1);
+  }
+
+  // Each two points are a line of their own.
+  pairs(buffer, first) {
+    const gl = this.drawing.gl;
+    return this.drawing.layout(buffer, 32, [[0, 4, gl.FLOAT, false, 16 * first], [1, 4, gl.FLOAT, false, 16 * (first + 1)]], 1);
   }
 
   track(points) {
@@ -61,6 +70,11 @@ class Lines {
         this.stroke(common, plan.array, plan.count - 1, {...PLAN, colour: robot.planned, dash});
       }
       this.stroke(common, robot.track.array, driven, {...TRACK, colour: robot.colour, dash: 0});
+      const known = this.newest(robot.objects, now);
+      if (known && known.count) {
+        if (known.array === undefined) known.array = this.pairs(robot.objects.buffer, known.first);
+        this.stroke(common, known.array, known.count / 2, {...ARROW, colour: this.tracked, dash: 0});
+      }
     }
     gl.depthMask(true);
     this.robots.forEach(robot => this.scan(common, robot.scans, now, camera));
