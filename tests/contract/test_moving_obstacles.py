@@ -6,7 +6,9 @@ from functools import partial
 
 import pytest
 
+from mbf_abstract.compiling.kernel_cache import compile_lazily
 from mbf_abstract.events import EventKind
+from mbf_abstract.maps.tracking import avoidance
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
 from mbf_abstract.testing.conformance.rig import ROBOT_RADIUS, Box
@@ -91,6 +93,20 @@ def test_a_sampling_controller_avoids_them_without_the_guard_too(backends, backe
         walker, result = drive(made, *SAMPLING[backend, controller], stop_before_contact=False)
         assert result.success, result.message
         assert walker.touched_by == ""
+
+
+@pytest.mark.parametrize(("backend", "controller"), SAMPLING)
+def test_what_looks_ahead_is_compiled_before_the_robot_drives(backends, monkeypatch, backend, controller):
+    """A robot whose controller compiles while somebody comes drives on unguarded."""
+    fresh = compile_lazily(avoidance.meet.py_func, error_model="numpy")
+    monkeypatch.setattr(avoidance, "meet", fresh)
+    with site(partial(backends[backend], controller=controller), **PARAMETERS) as made:
+        path = made.path((2.0, 4.0), (8.0, 4.0))
+        made.server.warm_up(path[0], path[-1])
+        compiled = list(fresh.signatures)
+        assert compiled
+        drive(made, *SAMPLING[backend, controller])
+        assert fresh.signatures == compiled
 
 
 def test_without_the_guard_it_drives_into_them(make_map_server):

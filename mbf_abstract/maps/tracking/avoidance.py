@@ -93,6 +93,9 @@ class MovingAround:
     def meet(self, poses: Float32Array, step_time: float) -> Encounters:
         """What motions meet.
 
+        The kernel is called where nobody moves, too, so that it is not compiled while the robot drives towards the
+        first one who does.
+
         Parameters
         ----------
         poses : (3, steps, n) float32
@@ -100,9 +103,7 @@ class MovingAround:
         step_time : float
             Length of a step [s].
         """
-        p, samples = self.limits, poses.shape[2]
-        if not self.anybody:
-            return Encounters(np.zeros(samples, dtype=np.float32), np.zeros(samples, dtype=np.bool_))
+        p = self.limits
         stride = max(1, round(LOOK / step_time))
         costs, touches = meet(poses, self.yaw, step_time, stride, self.box, self.objects, p.horizon, p.margin)
         return Encounters(np.float32(p.weight) * costs, touches)

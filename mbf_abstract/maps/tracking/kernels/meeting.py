@@ -61,12 +61,14 @@ def meet(
         Whether the motion leads into an object at a time when the robot that stays is not touched by it.
     """
     _, steps, samples = poses.shape
+    costs, touches = np.zeros(samples, dtype=np.float32), np.zeros(samples, dtype=np.bool_)
+    if len(objects) == 0:
+        return costs, touches
     back, front, right, left, radius = box[0], box[1], box[2], box[3], box[4]
     extent = np.sqrt(max(-back, front) ** 2 + max(-right, left) ** 2) + radius + np.float32(margin)
     per_margin, zero, one = np.float32(1.0 / margin), np.float32(0.0), np.float32(1.0)
     cosine_now, sine_now = np.float32(np.cos(yaw)), np.float32(np.sin(yaw))
     is_disc = back == zero and front == zero and right == zero and left == zero
-    costs, touches = np.zeros(samples, dtype=np.float32), np.zeros(samples, dtype=np.bool_)
     cosines, sines = np.ones(samples, dtype=np.float32), np.zeros(samples, dtype=np.float32)
     for t in range(stride - 1, steps, stride):
         time = np.float32((t + 1) * step_time)
