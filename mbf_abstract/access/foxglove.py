@@ -6,8 +6,8 @@ A package that can show a robot live offers a function by an entry point of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from typing import Any
@@ -93,14 +93,15 @@ def report_addresses(options: ServerOptions, port: int, note: Callable[[str], No
         )
 
 
+@contextmanager
 def live_robot(
     options: FoxgloveOptions | None,
     session: NavigationSession,
     send: Callable[[Any], Any],
     name: str,
     note: Callable[[str], None],
-) -> AbstractContextManager[object]:
-    """Serve a robot live inside a block, if that is wanted.
+) -> Iterator[object]:
+    """Serve a robot live inside a block, if that is wanted; at its end the robot is stopped before the server.
 
     Parameters
     ----------
@@ -121,7 +122,8 @@ def live_robot(
         A package is missing.
     """
     if options is None:
-        return nullcontext()
+        yield None
+        return
     points = list(entry_points(group=LIVE_APPS_GROUP, name=FOXGLOVE))
     if not points:
         raise ValueError("--foxglove: no package that serves robots live is installed")
@@ -129,4 +131,10 @@ def live_robot(
         serve: Callable[..., AbstractContextManager[object]] = points[0].load()
     except ImportError as error:
         raise ValueError(f"--foxglove needs more packages: pip install 'mbf-flex[foxglove]' ({error})") from error
-    return serve(session, send, options, name, note)
+    with serve(session, send, options, name, note) as served:
+        try:
+            yield served
+        finally:  # clients that are slow to go must not let it drive on
+            server, reason = session.navigator.server, "the program ends"
+            server.runtime.gate.close(reason)
+            server.cancel_all(reason)

@@ -22,6 +22,7 @@ from mbf_abstract.time.clock import ClockThread, WallClock
 POLICY_VIOLATION, TRY_AGAIN_LATER = 1008, 1013  # WebSocket close codes (RFC 6455, 7.4.1)
 TIME_TO_AUTHENTICATE = 10.0  # s
 TIME_TO_START, TIME_TO_SEND, TIME_TO_STOP = 10.0, 0.5, 3.0  # s
+TIME_TO_SAY_GOODBYE = 1.0  # s for a client to answer that the connection closes
 MOST_REFUSALS = 20  # that are noted
 WRITE_LIMIT = 32 * 1024  # bytes on their way to one client, after which frames wait in its outbox
 SECURITY_HEADERS = {
@@ -52,6 +53,7 @@ class ServerOptions:
     max_message : int
         Longest message of a client [bytes].
     max_clients : int
+        With the token, and as many that have not given it yet.
     ports : int
         How many are tried, one after the other.
     """
@@ -84,6 +86,8 @@ class Offer:
         Those that it speaks, the best first; a client must speak one of them. Without any, none is negotiated.
     pages : mapping of str to (str, bytes)
         Content type and content of each path that is answered over HTTP.
+    takes_auth : bool
+        Whether a client may connect without the token and give it by an operation.
     """
 
     name: str
@@ -91,6 +95,7 @@ class Offer:
     origin_option: str
     subprotocols: tuple[str, ...] = ()
     pages: Mapping[str, tuple[str, bytes]] = field(default_factory=dict)
+    takes_auth: bool = False
 
 
 class WebSocketServer(Generic[AnyVisitor]):
@@ -187,6 +192,7 @@ class WebSocketServer(Generic[AnyVisitor]):
                     subprotocols=[Subprotocol(name) for name in self._offer.subprotocols] or None,
                     max_size=self._options.max_message,
                     write_limit=WRITE_LIMIT,
+                    close_timeout=TIME_TO_SAY_GOODBYE,
                     compression=None,
                     logger=_logger,
                 )
@@ -233,15 +239,20 @@ class WebSocketServer(Generic[AnyVisitor]):
         own = origins and access.is_same_site(origins[0], hosts[0])
         if len(origins) > 1 or (origins and not own and origins[0] not in self._options.origins):
             return http.HTTPStatus.FORBIDDEN, f"a page of {origins[0]} may not connect; see {self._offer.origin_option}"
-        if path not in ("", "/") and access.role_and_path(path) is None:
-            return http.HTTPStatus.FORBIDDEN, "the token in the address is wrong"
+        if access.role_and_path(path) is None:
+            if path not in ("", "/"):
+                return http.HTTPStatus.FORBIDDEN, "the token in the address is wrong"
+            if not self._offer.takes_auth:
+                return http.HTTPStatus.FORBIDDEN, "the address needs the token"
         return None
 
     async def _handle(self, connection: Any) -> None:
         """Serve one client until it is gone."""
         from websockets.exceptions import ConnectionClosed
 
-        if len(self._visitors) >= self._options.max_clients:
+        is_known = self._options.access.role_and_path(connection.request.path) is not None
+        alike = sum((visitor.role is not None) == is_known for visitor in self._visitors)
+        if alike >= self._options.max_clients:  # who gives no token takes the place of none who has one
             await connection.close(TRY_AGAIN_LATER, "too many clients")
             return
         client = self._welcome(connection)

@@ -35,7 +35,7 @@ RosbridgeServer = WebSocketServer[Client]
 
 def rosbridge_server(bridge: Bridge, events: EventBus, options: ServerOptions) -> RosbridgeServer:
     """Return a server of a bridge and its page, not started yet."""
-    offer = Offer("rosbridge", extra="bridge", origin_option="--allow-origin", pages=page_files())
+    offer = Offer("rosbridge", extra="bridge", origin_option="--allow-origin", pages=page_files(), takes_auth=True)
     return WebSocketServer(bridge, events, options, offer)
 
 

@@ -94,18 +94,19 @@ class LiveServer:
         report_addresses(self._options, self.port, self._note, title)
 
     def close(self) -> None:
-        """Send the last part and listen no more."""
-        self._send_part()
-        self._feed.close()
-        self._server.close()
+        """Listen no more; the feed may still be looked at on another thread, and what that finds is not sent."""
+        with ExitStack() as closing:
+            closing.callback(self._server.close)
+            closing.callback(self._feed.close)
 
     def look(self) -> None:
         """Hand on the next part, if the last one has been worked on and some time has passed; never waits."""
         if self._service.is_ready and self._wall.now() >= self._next_part:
             self._next_part = self._wall.now() + PART_PERIOD
-            self._send_part()
+            self.send_part()
 
-    def _send_part(self) -> None:
+    def send_part(self) -> None:
+        """Hand on the next part; on the thread that looks."""
         part = self._feed.part()
         if part is not None:
             self._service.is_ready = False
@@ -172,6 +173,7 @@ class LiveFoxglove:
         with ExitStack() as exits:
             exits.callback(self._server.close)
             self._server.start(self._title)
+            exits.callback(self._server.send_part)  # the last one
             end = self._controls.end
             exits.enter_context(orderly_ctrl_c(lambda: self._controls.post(lambda: end("Ctrl-C"))))
             self._exits = exits.pop_all()

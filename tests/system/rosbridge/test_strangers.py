@@ -152,6 +152,17 @@ def test_more_clients_than_allowed_are_sent_away(serving, raw, ask):
         ask(raw(server.port), TOPICS, "service_response")
 
 
+def test_who_has_no_token_takes_no_place_of_those_who_have_one(serving, raw, ask):
+    access = PageAccess.by_token()
+    _, server = serving(server={"access": access, "max_clients": 1})
+    stranger = raw(server.port)
+    with pytest.raises(ConnectionClosed, match="1013"):
+        ask(raw(server.port), TOPICS, "service_response")
+    token = next(iter(access.roles))
+    assert ask(raw(server.port, path=f"/{token}/"), TOPICS, "service_response")["result"] is True
+    stranger.close()
+
+
 def creep(request):
     return ControlResult(ExePathOutcome.SUCCESS, "driving", Twist.planar(0.02))
 

@@ -1,5 +1,8 @@
 """A robot that no recorder of ours follows, live: where it is, what it sees and plans, and goals for it."""
 
+import re
+import socket
+import threading
 from contextlib import ExitStack
 
 import numpy as np
@@ -123,6 +126,58 @@ def test_goals_that_come_while_it_is_held_are_held_too(robot, client):
     assert app.call("/resume")["success"]
     app.until(lambda: events(app, "goal_finished"))
     assert events(app, "goal_finished")[0]["data"]["outcome"] == 0
+
+
+@pytest.fixture
+def dead_client():
+    """Connect to a server and never answer it, not even when it says goodbye."""
+    with ExitStack() as closing:
+
+        def connect(address):
+            port, path = re.fullmatch(r"ws://127\.0\.0\.1:(\d+)(/.*)", address).groups()
+            near = closing.enter_context(socket.create_connection(("127.0.0.1", int(port))))
+            near.sendall(
+                f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
+                "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n".encode()
+            )
+            assert b" 101 " in near.recv(100)
+
+        yield connect
+
+
+def test_at_the_end_the_robot_is_stopped_before_a_dead_client_is_waited_for(robot, client, dead_client, monkeypatch):
+    served = robot()
+    server, app = served.session.navigator.server, client(served)
+    dead_client(served.address(Role.STEER))
+    app.subscribe("/motion")
+    app.publish("/clicked_point", POINT)
+    app.until(lambda: any(message["speed"] > 0.0 for message in app.messages.get("/motion", [])))
+    sockets = served.live._server
+    stood, close = [], sockets.close
+    monkeypatch.setattr(sockets, "close", lambda: (stood.append(server.runtime.gate.closed), close()))
+    served.__exit__()
+
+    assert stood == [True]
+    assert sockets._loop.is_closed(), "it has not waited longer than its thread was waited for"
+
+
+def test_a_server_that_is_closed_looks_at_nothing_and_listens_no_more_whatever_its_feed_does(robot, monkeypatch):
+    served = robot()
+
+    def fail():
+        raise RuntimeError("the feed is damaged")
+
+    parts = []
+    monkeypatch.setattr(served.live._feed, "part", lambda: parts.append(threading.current_thread()))
+    monkeypatch.setattr(served.live._feed, "close", fail)
+    with pytest.raises(RuntimeError, match="damaged"):
+        served.live.close()
+    monkeypatch.undo()
+
+    assert threading.current_thread() not in parts, "its feed is looked at on one thread only"
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", served.live.port))
 
 
 def test_a_goal_that_is_not_taken_is_answered_with_the_reason(robot, client):
