@@ -6,10 +6,13 @@ sensors have seen in the window counts for squares and for plans, too.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
+
+import numpy as np
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
@@ -163,9 +166,23 @@ class TiledNavigationMap(LayeredMap):
         there = self.around(x, y, self.inscribed_radius)
         return () if there is None else ground_heights(there, x, y)
 
-    def heights_below(self, points: FloatArray) -> FloatArray | None:
-        """As on one mesh, but also nan out of the window; None without one."""
-        return None if self._window is None else self._window.now.map.heights_below(points)
+    def heights_below(self, points: FloatArray) -> FloatArray:
+        """Height (n,) [m] of the first surface straight below each point (n, 3) [m], nan where there is none.
+
+        Points that are too far apart for one part of the map are answered in halves.
+        """
+        if len(points) == 0:
+            return np.zeros(0)
+        lowest, highest = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        (x, y), (width, depth) = (0.5 * (lowest + highest)).tolist(), (highest - lowest).tolist()
+        radius = 0.5 * math.hypot(width, depth)
+        if radius <= self.reach:
+            there = self.around(x, y, radius)
+            return np.full(len(points), np.nan) if there is None else there.heights_below(points)
+        near = points[:, 0] <= x if width >= depth else points[:, 1] <= y
+        heights = np.empty(len(points))
+        heights[near], heights[~near] = self.heights_below(points[near]), self.heights_below(points[~near])
+        return heights
 
     # -------------------------------------------------------------------------------------------------- places
     def point_check(self) -> PlaceCheck:

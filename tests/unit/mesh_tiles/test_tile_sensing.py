@@ -220,9 +220,8 @@ def test_questions_in_the_window_have_the_answers_of_the_whole_mesh(tiled_hills,
         assert ours.state == exact.state
         asked += exact.state == CellState.LETHAL
     assert asked > 5
-    above = np.add(places, (0.01, 0.02, 3.0))
-    assert tiled.heights_below(above) == pytest.approx(whole.map.heights_below(above), nan_ok=True)
-    assert np.isnan(tiled.heights_below(np.add(way[-1:], (0.0, 0.0, 3.0)))).all(), "far out of the window"
+    for above in (np.add(places, (0.01, 0.02, 3.0)), np.add(way[-1:], (0.0, 0.0, 3.0))):  # and far out of the window
+        assert tiled.heights_below(above) == pytest.approx(whole.map.heights_below(above), nan_ok=True)
 
 
 def pairs_over_the_edge(tiled, whole, way):

@@ -231,3 +231,12 @@ def test_a_picture_of_a_map_with_a_tile_of_another_place_is_one_error(changing):
     shutil.copy(tile_file(folder, (2, 2)), tile_file(folder, (2, 1)))
     with pytest.raises(MeshError, match=r"tile_2_1\.npz"):
         changing.view("safe")
+
+
+def test_heights_below_points_are_those_of_the_whole_mesh_however_far_apart_the_points_are(tiled, whole_hills):
+    rng = np.random.default_rng(4)
+    corners = whole_hills.map.vertices
+    points = rng.uniform(corners.min(axis=0) - 2.0, corners.max(axis=0) + 2.0, (60, 3))
+    for some in (points, points[:1], points[:0]):
+        assert tiled.heights_below(some) == pytest.approx(whole_hills.map.heights_below(some), nan_ok=True)
+    assert 0 < np.isnan(tiled.heights_below(points)).sum() < 60
