@@ -117,6 +117,8 @@ class Episode:
         over an episode with one goal is the first way less the last one. What the simulation raises is raised here.
         """
         session = self.session
+        if self._replan_at <= session.clock.now() + TIME_TOLERANCE:  # as in a run: the next command is on the new plan
+            self._plan_to_goal(is_new=False)
         self._lease.send(command)
         session.clock.sleep(self._control_period)
         if session.loop.failure is not None:
@@ -124,8 +126,6 @@ class Episode:
         for pose in session.simulation.track[self._seen_track :]:
             self._max_tilt = max(self._max_tilt, tilt_of(pose))
         self._seen_track = len(session.simulation.track)
-        if self._replan_at <= session.clock.now() + TIME_TOLERANCE:
-            self._plan_to_goal(is_new=False)
         before, self._way_left = self._way_left, self._measured_way()
         gained = before - self._way_left
         self._take_arrival()
@@ -133,7 +133,7 @@ class Episode:
 
     def _measured_way(self) -> float:
         """Length [m] of the plan that is left for the robot in truth, and its distance from the plan."""
-        self._way.update(self.true_pose.position)
+        self._way.update(self.true_pose.position[: self._observer.dimensions])
         return self._way.remaining + self._way.deviation
 
     def observe(self) -> Observation:
@@ -161,7 +161,8 @@ class Episode:
             path = Path.from_points([self.true_pose.position, goal.position], goal.orientation)
         if path is not None:
             self._observer.set_plan(path)
-            self._way = PathTracker(path)
+            assert self._observer.tracker is not None
+            self._way = PathTracker(self._observer.tracker.path, self._observer.dimensions)
 
     def _planned(self, goal: Pose) -> Path | None:
         """What the planner and, if the configuration names one, the refiner make of the way to a goal."""
@@ -177,9 +178,9 @@ class Episode:
         """Go on to the next goal once the robot is at one by its estimated pose, as navigation decides it."""
         parameters, goal = self._runtime.parameters, self._goals[0]
         pose, _ = self._state()
-        distance, angle = pose.distance_to(goal), abs(normalize_angle(pose.yaw - goal.yaw))
-        if distance >= parameters.dist_tolerance or angle >= parameters.angle_tolerance:
+        if not self._observer.has_arrived(pose, parameters.dist_tolerance, parameters.angle_tolerance):
             return
+        distance, angle = pose.distance_to(goal), abs(normalize_angle(pose.yaw - goal.yaw))
         result = MoveBaseResult(MoveBaseOutcome.SUCCESS, "", pose, distance, angle)
         self._arrivals.append(Arrival.at(goal, self.true_pose, result))
         if len(self._goals) > 1:

@@ -20,7 +20,8 @@ from typing import Any, ClassVar
 
 from numpy.typing import ArrayLike
 
-from mbf_abstract.geometry import Path, Pose, normalize_angle
+from mbf_abstract.drive.velocity_limits import VelocityLimits
+from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.navigation_map import MapContext, MapPlugin
 from mbf_abstract.outcomes import ExePathOutcome
@@ -36,8 +37,17 @@ class PolicyParameters(PluginParameters):
     max_scan_age: float = parameter(
         0.5, "The robot stops where the newest scan of a sensor is older; 0 = never.", unit="s", ge=0.0, le=60.0
     )
+    sources: tuple[str, ...] = parameter(
+        (),
+        "Sensors that are observed, each of which must send scans; empty = all that have sent any.",
+        dynamic=False,
+    )
     check_ahead_time: float = parameter(
-        0.5, "The robot stops where the command would touch something so soon on the map; 0 = never.", unit="s", ge=0.0
+        0.5,
+        "The robot stops where the command would touch something so soon on the map; 0 = never.",
+        unit="s",
+        ge=0.0,
+        le=10.0,
     )
 
 
@@ -64,7 +74,9 @@ class PolicyController(MapPlugin, AbstractController):
 
     def __init__(self, context: MapContext[Any]) -> None:
         super().__init__(context)
-        self._observer = Observer(self.observation, self.navigation_map, self.transforms, self.scans)
+        sources = self.parameters.sources
+        self._observer = Observer(self.observation, self.navigation_map, self.transforms, self.scans, sources)
+        self._curves = VelocityLimits(min_turning_radius=self.min_turning_radius)
 
     @abstractmethod
     def act(self, observation: Observation) -> ArrayLike:
@@ -72,36 +84,42 @@ class PolicyController(MapPlugin, AbstractController):
 
     @property
     def turns_on_the_spot(self) -> bool:
-        """True: nothing keeps a policy from doing so."""
-        return True
+        """True unless the robot cannot: commands keep to its tightest curve."""
+        return self.min_turning_radius == 0.0
 
     def set_plan(self, path: Path) -> bool:
-        """Take over a path that has poses."""
-        if len(path) == 0:
+        """Take over a path that has poses, in a frame with a transform to the map's."""
+        if len(path) == 0 or not self.transforms.can_transform(self.navigation_map.frame_id, path.frame_id):
             return False
         self._observer.set_plan(path)
         return True
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
-        """Observe, ask the policy, and check the command on the map."""
-        limits, age = self.parameters, self._observer.scan_age(self.clock.now())
-        if limits.max_scan_age and age > limits.max_scan_age:
-            return ControlResult(ExePathOutcome.NO_VALID_CMD, f"the newest scan is {age:.2f} s old")
+        """Observe, ask the policy, and check on the map what the robot would drive.
+
+        The age of scans is judged last, so that a call without scans has loaded and compiled all that a drive needs.
+        """
+        limits = self.parameters
+        problem = self._observer.scan_problem(self.clock.now(), limits.max_scan_age) if limits.max_scan_age else ""
+        obstacle = ""
         try:
             observation = self._observer.observe(request.pose, request.velocity)
-            command = self.commands.command(self.act(observation))
-            there = self.on_map(request.pose)
+            command = self._curves.apply(self.commands.command(self.act(observation)))
+            assert isinstance(command, Twist)
+            if limits.check_ahead_time:
+                there = self.on_map(request.pose)
+                obstacle = self.navigation_map.obstacle_ahead(there, command, limits.check_ahead_time)
         except TransformError as error:
-            return ControlResult(ExePathOutcome.TF_ERROR, str(error))
-        if limits.check_ahead_time:
-            obstacle = self.navigation_map.obstacle_ahead(there, command, limits.check_ahead_time)
-            if obstacle:
-                return ControlResult(ExePathOutcome.BLOCKED_PATH, obstacle)
+            return ControlResult(
+                ExePathOutcome.NO_VALID_CMD if problem else ExePathOutcome.TF_ERROR, problem or str(error)
+            )
+        if problem:
+            return ControlResult(ExePathOutcome.NO_VALID_CMD, problem)
+        if obstacle:
+            return ControlResult(ExePathOutcome.BLOCKED_PATH, obstacle)
         return ControlResult(ExePathOutcome.SUCCESS, "", command)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
-        """Whether the pose is within both tolerances of the end of the path."""
-        goal = None if self._observer.tracker is None else self._observer.tracker.goal
-        if goal is None or pose.distance_to(goal) > dist_tolerance:
-            return False
-        return abs(normalize_angle(goal.yaw - pose.yaw)) <= angle_tolerance
+        """Whether the path has been driven to its end, and the pose is within both tolerances of it."""
+        has_plan = self._observer.tracker is not None
+        return has_plan and self._observer.has_arrived(pose, dist_tolerance, angle_tolerance)

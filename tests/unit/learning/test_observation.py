@@ -8,8 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_costmap_nav.grid.costmap import GridGeometry
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from terrain.learning.observation import ObservationParameters, Observer
 from terrain.worlds.heightfield import Heightfield
@@ -59,9 +63,52 @@ def test_sectors_hold_the_nearest_points_of_all_scans(one, other, at):
 def test_rays_that_hit_nothing_and_sensors_that_are_silent_see_free_space():
     scan = RangeScan.of_rays("a", (0, 0, 0.3), [(1.0, 0.0, 0.3)], [False], 0.0)
     assert observer(NO_PATCH, [scan]).observe(Pose.planar(0.0, 0.0), Twist())["scan"].tolist() == [3.0] * 7
-    seeing = observer(NO_PATCH, [scan])
-    assert (seeing.scan_age(2.0), observer(NO_PATCH).scan_age(2.0)) == (2.0, math.inf)
-    assert observer(NO_PATCH.model_copy(update={"scan_sectors": 0})).scan_age(2.0) == 0.0
+
+
+def test_scans_that_are_old_missing_or_of_the_future_are_a_problem():
+    def problem(now, *scans, sources=(), parameters=NO_PATCH):
+        seen = {one.source: one for one in scans}
+        return Observer(parameters, flat_mesh(), TransformBuffer(), seen, sources).scan_problem(now, 0.5)
+
+    front, rear = (RangeScan.of_points(name, [(1.0, 0.0, 0.3)], (0, 0, 0.3), 10.0) for name in ("front", "rear"))
+    assert problem(10.5, front, rear) == "" and problem(9.8, front) == ""
+    assert problem(12.0, front) == "the newest scan of 'front' is 2.00 s old"
+    assert problem(4.0, front) == "the newest scan of 'front' is stamped 6.00 s in the future"
+    assert problem(10.0) == "no scan of any sensor has come"
+    assert problem(10.0, front, sources=("front", "rear")) == "no scan of 'rear' has come"
+    assert problem(10.0, front, rear, sources=("front", "rear")) == ""
+    forgotten = RangeScan.of_points("demo", [(1.0, 0.0, 0.3)], (0, 0, 0.3), 1.0)
+    assert problem(10.0, front, forgotten) and problem(10.0, front, forgotten, sources=("front",)) == ""
+    assert problem(10.0, parameters=NO_PATCH.model_copy(update={"scan_sectors": 0})) == ""
+
+
+def test_only_the_sensors_that_are_named_are_observed():
+    scan = RangeScan.of_points("demo", [(1.0, 0.0, 0.3)], (0, 0, 0.3), 1.0)
+    named = Observer(NO_PATCH, flat_mesh(), TransformBuffer(), {"demo": scan}, ("lidar",))
+    named.set_plan(Path.from_points([(2.0, 0.0, 0.0)]))
+    assert named.observe(Pose.planar(0.0, 0.0), Twist())["scan"].tolist() == [3.0] * 7
+
+
+def test_a_sensor_that_sends_its_first_scan_meanwhile_does_not_disturb_an_observation():
+    scans = {}
+
+    class Meanwhile(TransformBuffer):
+        """Another thread takes a scan while this one looks up a transform."""
+
+        def lookup(self, *args, **kwargs):
+            scans.setdefault("late", scan("late"))
+            return super().lookup(*args, **kwargs)
+
+    def scan(name):
+        return RangeScan.of_points(name, [(1.0, 0.0, 0.3)], (0, 0, 0.3), 0.0, "laser")
+
+    transforms = Meanwhile()
+    transforms.set(Transform((0.0, 0.0, 0.0), parent="map", child="laser", static=True))
+    scans["early"] = scan("early")
+    seeing = Observer(NO_PATCH, flat_mesh(), transforms, scans)
+    seeing.set_plan(Path.from_points([(2.0, 0.0, 0.0)]))
+    assert min(seeing.observe(Pose.planar(0.0, 0.0), Twist())["scan"]) == 1.0
+    assert scans.keys() == {"early", "late"}
 
 
 def test_goal_plan_and_velocity_are_in_the_frame_of_the_robot():
@@ -101,3 +148,35 @@ def test_under_a_ceiling_the_floor_is_the_ground():
     for z in (0.1, 3.1):
         seen = observer(p, navigation_map=storeys).observe(Pose.planar(0.0, 0.0, z=z), Twist())["patch"]
         assert seen == pytest.approx(np.full((3, 3), -0.1), abs=1e-6)
+
+
+@pytest.mark.parametrize(("height", "seen"), [(0.8, 0.8), (1.5, 1.5), (1.9, 1.9), (2.5, -2.0)])
+def test_ground_higher_than_the_robot_is_seen_as_such_up_to_the_range(height, seen):
+    steps = np.zeros((5, 9))
+    steps[:, 5:] = height  # from x = 1 m on
+    mesh = MeshMap.from_heights(steps, 1.0, 1.0, -4.0, -2.0)
+    p = ObservationParameters(scan_sectors=0, patch_cells=3, patch_spacing=1.5)
+    patch = observer(p, navigation_map=mesh).observe(Pose.planar(0.0, 0.0), Twist())["patch"]
+    assert patch[2].tolist() == pytest.approx([seen] * 3) and patch[:2].tolist() == [[0.0] * 3] * 2
+
+
+def test_a_ramp_is_seen_from_its_foot_to_the_range():
+    ramp = MeshMap.from_heights(np.tile(np.arange(-4.0, 5.0), (9, 1)), 1.0, 1.0, -4.0, -4.0)  # 45 degrees along x
+    p = ObservationParameters(scan_sectors=0, patch_cells=9, patch_spacing=0.5)
+    patch = observer(p, navigation_map=ramp).observe(Pose.planar(0.0, 0.0), Twist())["patch"]
+    assert patch[:, 4].tolist() == pytest.approx(np.arange(-2.0, 2.01, 0.5).tolist(), abs=1e-6)
+
+
+def on_a_hill(pitch):
+    """A robot 2 m above a plan of an empty level map."""
+    return Pose((1.0, 0.1, 2.0), (0.0, math.sin(0.5 * pitch), 0.0, math.cos(0.5 * pitch)))
+
+
+def test_on_a_level_map_heights_and_pitch_change_neither_goal_nor_plan():
+    level = LayeredCostmap(GridGeometry(80, 80, 0.1, -4.0, -4.0), [], Footprint([]))
+    flat = observer(NO_PATCH, navigation_map=level).observe(Pose.planar(1.0, 0.1), Twist())
+    tilted = observer(NO_PATCH, navigation_map=level)
+    seen = tilted.observe(on_a_hill(pitch=-0.3), Twist())
+    assert all(seen[part] == pytest.approx(flat[part], abs=1e-6) for part in ("goal", "waypoints"))
+    assert tilted.tracker.deviation == pytest.approx(0.1)
+    assert observer(NO_PATCH).observe(on_a_hill(pitch=-0.3), Twist())["goal"] != pytest.approx(flat["goal"], abs=0.1)
