@@ -14,6 +14,7 @@ from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.commands.waiting import waiting
 from mbf_ros.ending import wait_for_ctrl_c
 from mbf_ros.rosbridge_robot.command import connect
+from mbf_ros.serving_options import KEEP_GOALS, MAP_PERIOD
 
 if TYPE_CHECKING:
     from mbf_abstract.access.page_access import PageAccess
@@ -63,12 +64,8 @@ def serve(
         help="Time without odometry, transforms or a sensor at which a robot that is a client stops, in s; "
         "0 = command_timeout.",
     ),
-    keep_goals: bool = typer.Option(
-        False, "--keep-goals", help="A goal goes on when its client is gone; else it is canceled."
-    ),
-    map_period: float = typer.Option(
-        1.0, "--map-period", min=0.05, help="Least time between two messages of a costmap or a mesh, in s."
-    ),
+    keep_goals: bool = KEEP_GOALS,
+    map_period: float = MAP_PERIOD,
     robot_only: bool = typer.Option(
         False, "--robot-only", help="Only the robot of a scenario, for a navigator that connects: see bridge connect."
     ),

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 from mbf_abstract.event_values import error_text
 from mbf_abstract.geometry.transform import TransformError
@@ -41,14 +42,21 @@ class Input:
     ----------
     topic, type : str
     quality : Quality
-    take : callable
-        Takes a message; raises MessageError where it means nothing.
+    taker : callable
+        Uses a message; raises ValueError or TransformError where it means nothing, or is refused.
     """
 
     topic: str
     type: str
     quality: Quality
-    take: Take
+    taker: Take
+
+    def take(self, message: Message) -> None:
+        """Take a message; raises MessageError where it means nothing, or is refused."""
+        try:
+            self.taker(message)
+        except (ValueError, TransformError) as error:
+            raise MessageError(error_text(error)) from error
 
 
 @dataclass(frozen=True)
@@ -82,16 +90,15 @@ class RobotInputs:
 
         if uses_odometry:
             yield Input(ODOM, "nav_msgs/Odometry", Quality.SENSOR_DATA, take_odometry)
-        yield Input(TF, "tf2_msgs/TFMessage", Quality.MANY, _refusing(take_transforms))
-        static = _refusing(lambda message: take_transforms(message, static=True))
-        yield Input(TF_STATIC, "tf2_msgs/TFMessage", Quality.LATCHED, static)
+        yield Input(TF, "tf2_msgs/TFMessage", Quality.MANY, take_transforms)
+        yield Input(TF_STATIC, "tf2_msgs/TFMessage", Quality.LATCHED, partial(take_transforms, static=True))
 
     def of_sensors(
         self, take_scan: Callable[[RangeScan], None], chosen: Mapping[str, tuple[str, str]]
     ) -> Iterator[Input]:
         """Yield sensors that feed a map: type of ``sensors.SENSORS`` and source in the configuration, by topic."""
         for topic, (kind, source) in chosen.items():
-            yield Input(topic, kind, Quality.SENSOR_DATA, _refusing(self._sensor(topic, kind, source, take_scan)))
+            yield Input(topic, kind, Quality.SENSOR_DATA, self._sensor(topic, kind, source, take_scan))
 
     def of_users(
         self, send: Callable[[MoveBaseGoal], AnyGoalHandle], refusal: Callable[[], str] = lambda: ""
@@ -114,15 +121,3 @@ class RobotInputs:
             self.hear(topic)
 
         return take
-
-
-def _refusing(take: Take) -> Take:
-    """A taker whose map or transforms may refuse what a message says, and which raises MessageError then."""
-
-    def take_or_refuse(message: Message) -> None:
-        try:
-            take(message)
-        except (ValueError, TransformError) as error:
-            raise MessageError(error_text(error)) from error
-
-    return take_or_refuse

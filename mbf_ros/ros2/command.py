@@ -14,6 +14,7 @@ from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, 
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from mbf_abstract.commands.waiting import waiting
 from mbf_ros.ending import shown_state
+from mbf_ros.serving_options import KEEP_GOALS, MAP_PERIOD
 
 if TYPE_CHECKING:
     from mbf_ros.ros2.node import NavigationNode
@@ -40,18 +41,14 @@ def ros2(
         min=0.0,
         help="Time without odometry, transforms or a sensor at which the robot stops, in s; 0 = command_timeout.",
     ),
-    keep_goals: bool = typer.Option(
-        False, "--keep-goals", help="A goal goes on when its client is gone; else it is canceled."
-    ),
+    keep_goals: bool = KEEP_GOALS,
     nav2: bool = typer.Option(
         None, "--nav2/--no-nav2", help="Offer Nav2's names, too; if not given, where nav2_msgs is installed."
     ),
     amcl: bool = typer.Option(
         False, "--amcl", help="Answer Nav2's clients for amcl, too: the robot is localised by something else."
     ),
-    map_period: float = typer.Option(
-        1.0, "--map-period", min=0.05, help="Least time between two messages of a costmap or a mesh, in s."
-    ),
+    map_period: float = MAP_PERIOD,
     foxglove: bool = FOXGLOVE,
     foxglove_at: str = AT,
     foxglove_token: bool = TOKEN,

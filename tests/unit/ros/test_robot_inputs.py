@@ -12,6 +12,7 @@ SCAN = completed(
     "sensor_msgs/LaserScan",
     {"header": {"frame_id": "laser"}, "angle_min": 0.0, "angle_increment": 0.1, "range_max": 5.0, "ranges": [1.0]},
 )
+AT_ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
 
 
 def inputs(hear=lambda topic: None):
@@ -33,6 +34,29 @@ def test_a_static_transform_holds_at_all_times_and_another_one_from_its_arrival_
         one.take(completed(one.type, {"transforms": [body]}))
     assert {one.child: (one.static, one.stamp) for one in transforms.newest()}["laser"][0]
     assert {one.child: (one.static, one.stamp) for one in transforms.newest()}["base_link"] == (False, 3.0)
+
+
+@pytest.mark.parametrize("error", [ValueError("no room"), TransformError("no frame")])
+def test_a_message_of_any_input_that_is_refused_is_dropped_with_the_reason(error):
+    def refuse(*message):
+        raise error
+
+    class Refusing:
+        take_odometry = set = refuse
+
+    found = [
+        *inputs().of_robot(Refusing(), Refusing(), True),
+        *inputs().of_sensors(refuse, {"scan": ("sensor_msgs/LaserScan", "lidar")}),
+        *inputs().of_users(refuse),
+    ]
+    transform = {"header": {"frame_id": "map"}, "child_frame_id": "laser", "transform": {"rotation": {"w": 1.0}}}
+    bodies = {"tf2_msgs/TFMessage": {"transforms": [transform]}, "sensor_msgs/LaserScan": SCAN}
+    bodies["geometry_msgs/PoseStamped"] = {"pose": {"position": AT_ZERO, "orientation": {"w": 1.0}}}
+    bodies["nav_msgs/Odometry"] = {"twist": {"twist": {"linear": AT_ZERO, "angular": AT_ZERO}}}
+    assert len(found) == 6
+    for one in found:
+        with pytest.raises(MessageError, match=str(error)):
+            one.take(completed(one.type, bodies[one.type]))
 
 
 @pytest.mark.parametrize("error", [ValueError("no room"), TransformError("no frame")])
