@@ -21,7 +21,7 @@ from mbf_ros.map_messages import Audience, GridMessages
 from mbf_ros.messages import maps
 from mbf_ros.messages.cdr import serialized
 from mbf_ros.messages.geometry import MessageContext
-from mbf_ros.messages.interfaces import completed, json_text
+from mbf_ros.messages.interfaces import Message, completed, json_text
 
 SIDE, ROUNDS = 1000, 20
 GRID, UPDATES = "global_costmap/costmap", "global_costmap/costmap_updates"
@@ -68,6 +68,11 @@ def grid_messages(window: int) -> Callable[[], object]:
     return make
 
 
+def grid_of(view: GridView, context: MessageContext) -> Message:
+    """Return a view as a message."""
+    return maps.occupancy_grid(maps.occupancy_cells(view.costs), view.extent, "map", 0.0, context)
+
+
 def show(text: str, kind: str, make: Callable[[], Any]) -> None:
     """Print what it takes to make a message, its bytes, and with rclpy a message of ROS with the same bytes."""
     message = make()
@@ -90,7 +95,7 @@ def main() -> None:
     for window, text in ((0, "whole"), (100, "update of 100 x 100"), (1000, "update of all cells")):
         print(f"costmap {SIDE} x {SIDE}, {text}: {milliseconds(grid_messages(window))}")
     view, context = GridView(np.zeros((SIDE, SIDE), np.float32), (0.0, 50.0, 0.0, 50.0)), MessageContext()
-    show("costmap", "nav_msgs/OccupancyGrid", lambda: maps.occupancy_grid(view, "map", 0.0, context))
+    show("costmap", "nav_msgs/OccupancyGrid", lambda: grid_of(view, context))
     vertices, faces = heightfield_mesh(np.zeros((101, 101)), 0.2, 0.2)
     mesh, name = MeshView(vertices, faces.astype(np.int32), np.zeros(len(vertices), np.float32)), "mesh"
     show(name, "mesh_msgs/MeshGeometryStamped", lambda: maps.mesh_geometry(mesh, "mbf", "map", 0.0, context))

@@ -105,6 +105,8 @@ class CostmapNavigationServer(MapServer):
 
     ground_is_level = True
 
+    map_view_type = GridView
+
     @property
     def map_views(self) -> tuple[str, ...]:
         """Both maps."""

@@ -194,6 +194,8 @@ class MeshNavigationServer(MapServer):
         """Heights of all surfaces at a place, the lowest free one first; see ``ground.ground_heights``."""
         return ground_heights(self.mesh_map, x, y)
 
+    map_view_type = MeshView
+
     @property
     def map_views(self) -> tuple[str, ...]:
         """Names of the layers, the default layer first."""

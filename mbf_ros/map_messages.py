@@ -37,6 +37,10 @@ class Output(NamedTuple):
         How many messages wait for a slow listener.
     always : bool
         Whether messages are made although nobody listens, for those who come later.
+    shared : bool
+        Whether others publish it, too.
+    outdates : str
+        Topic whose earlier messages mean nothing after one of this; empty if there is none.
     """
 
     topic: str
@@ -44,6 +48,8 @@ class Output(NamedTuple):
     quality: Quality = Quality.MANY
     depth: int = 10
     always: bool = False
+    shared: bool = False
+    outdates: str = ""
 
 
 class Audience(NamedTuple):
@@ -97,8 +103,14 @@ class GridMessages(MapMessages):
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self._grid = Output(f"{self._name}/costmap", "nav_msgs/OccupancyGrid", Quality.LATCHED, depth=1)
         self._updates = Output(f"{self._name}/costmap_updates", "map_msgs/OccupancyGridUpdate")
+        self._grid = Output(
+            f"{self._name}/costmap",
+            "nav_msgs/OccupancyGrid",
+            Quality.LATCHED,
+            depth=1,
+            outdates=self._updates.topic,
+        )
         self.outputs = (self._grid, self._updates)
         self._cells: NDArray[np.int8] | None = None
         self._known: tuple[object, ...] = ()  # place, and who has got the whole of it
@@ -118,7 +130,7 @@ class GridMessages(MapMessages):
         overdue = window is not None and now - self._whole_at >= WHOLE_PERIOD
         if before is None or self._known != known or overdue or (window and updates.listeners < grid.listeners):
             self._known, self._whole_at = known, now
-            yield self._grid.topic, maps.occupancy_grid(view, self._frame_id, now, self._context())
+            yield self._grid.topic, maps.occupancy_grid(cells, view.extent, self._frame_id, now, self._context())
         elif window is not None:
             message = maps.occupancy_grid_update(cells, window, self._frame_id, now, self._context())
             yield self._updates.topic, message
@@ -173,11 +185,6 @@ def map_messages(
     audience: Callable[[str], Audience],
 ) -> list[MapMessages]:
     """Return the messages of all costmaps of a server; of a mesh those of the layer that planners see."""
-    made: list[MapMessages] = []
-    for name in server.map_views:
-        view = server.map_view(name)
-        if isinstance(view, GridView):
-            made.append(GridMessages(server, name, context, audience))
-        elif isinstance(view, MeshView) and not made:
-            made.append(MeshMessages(server, name, context, audience))
-    return made
+    if server.map_view_type is MeshView:
+        return [MeshMessages(server, name, context, audience) for name in server.map_views[:1]]
+    return [GridMessages(server, name, context, audience) for name in server.map_views]

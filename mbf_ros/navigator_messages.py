@@ -33,10 +33,10 @@ ROBOT_PERIOD, DIAGNOSTICS_PERIOD = 0.1, 1.0  # s
 
 PLAN = Output("plan", "nav_msgs/Path", Quality.LATCHED, depth=1, always=True)
 GOAL = Output("~/current_goal", "geometry_msgs/PoseStamped", Quality.LATCHED, depth=1, always=True)
-VECTOR_FIELD = Output("~/vector_field", "visualization_msgs/MarkerArray")
+VECTOR_FIELD = Output("~/vector_field", "visualization_msgs/MarkerArray", Quality.LATCHED, depth=1)
 LOCAL_PLAN = Output("local_plan", "nav_msgs/Path")
 FOOTPRINT = Output("~/footprint", "geometry_msgs/PolygonStamped")
-DIAGNOSTICS = Output("/diagnostics", "diagnostic_msgs/DiagnosticArray")
+DIAGNOSTICS = Output("/diagnostics", "diagnostic_msgs/DiagnosticArray", shared=True)
 EVENTS = Output("~/events", "std_msgs/String", depth=MAX_EVENTS)
 
 
@@ -85,6 +85,7 @@ class NavigatorMessages:
         self._events: deque[Event] = deque(maxlen=MAX_EVENTS)
         self._plan: Path | None = None
         self._shown_plan: Path | None = None
+        self._shown_field: tuple[Path, int] | None = None  # its plan, and how many had begun to listen
         self._goal: Pose | None = None
         self._server.get_path.listeners.append(self._take_plan)
         session.events.add_sink(self)
@@ -118,14 +119,16 @@ class NavigatorMessages:
             self._plan = handle.result.path
 
     def _plan_messages(self) -> Iterator[tuple[str, Message]]:
-        plan = self._plan
-        if plan is None or plan is self._shown_plan:
+        plan, audience = self._plan, self._audience(VECTOR_FIELD.topic)
+        if plan is None:
             return
-        self._shown_plan = plan
-        yield PLAN.topic, path_message(plan, self._context())
-        view = self._server.field_view(plan) if self._is_wanted(VECTOR_FIELD) else None
-        if view is not None:
-            yield VECTOR_FIELD.topic, maps.field_markers(view, plan.frame_id, plan.stamp, self._context())
+        if plan is not self._shown_plan:
+            self._shown_plan = plan
+            yield PLAN.topic, path_message(plan, self._context())
+        if audience.listeners and self._shown_field != (plan, audience.joined):
+            self._shown_field = plan, audience.joined
+            if (view := self._server.field_view(plan)) is not None:
+                yield VECTOR_FIELD.topic, maps.field_markers(view, plan.frame_id, plan.stamp, self._context())
 
     def _goal_messages(self) -> Iterator[tuple[str, Message]]:
         unfinished = self._server.move_base.unfinished

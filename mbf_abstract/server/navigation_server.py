@@ -34,7 +34,7 @@ from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.callbacks import CallbackThread
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.maps.view import FieldView, FloorMap, MapView
+from mbf_abstract.maps.view import FieldView, FloorMap, GridView, MapView, MeshView
 from mbf_abstract.parameters import ParameterModel, with_changes
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlanRequest, PluginKind
 from mbf_abstract.server.plugin_host import PluginHost
@@ -187,6 +187,9 @@ class AbstractNavigationServer(PluginHost):
         """Pose on the ground in the global frame: on the lowest free storey, at height 0 where there is no ground."""
         heights = self.ground_heights(x, y)
         return Pose.planar(x, y, yaw, heights[0] if heights else 0.0, frame_id=self.config.parameters.global_frame)
+
+    map_view_type: ClassVar[type[GridView] | type[MeshView] | None] = None
+    """What all of ``map_views`` look like; None if this server has nothing to show."""
 
     @property
     def map_views(self) -> tuple[str, ...]:

@@ -38,7 +38,7 @@ from mbf_ros.messages.geometry import (
     twist,
 )
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.messages.maps import mesh_markers, occupancy_grid
+from mbf_ros.messages.maps import mesh_markers, occupancy_cells, occupancy_grid
 from mbf_ros.messages.sensors import point_cloud
 
 ODOM, SENSOR = "odom", "range_sensor"
@@ -133,7 +133,7 @@ def _planned(time: float, points: FloatArray, context: MessageContext) -> BagMes
 def _mapped(time: float, view: MapView, context: MessageContext) -> BagMessage:
     frame = context.global_frame
     if isinstance(view, GridView):
-        grid = occupancy_grid(view, frame, time, context)
+        grid = occupancy_grid(occupancy_cells(view.costs), view.extent, frame, time, context)
         return _message(time, "/global_costmap/costmap", "nav_msgs/OccupancyGrid", grid, latched=True)
     markers = mesh_markers(view, frame, time, context)
     return _message(time, "/mesh_map", "visualization_msgs/MarkerArray", markers, latched=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
-from mbf_abstract.maps.view import FieldView, GridView, MeshView
+from mbf_abstract.maps.view import FieldView, MeshView
 from mbf_ros.messages.geometry import MessageContext, duration, pose, vector
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.messages.records import colors, points, triangles
@@ -55,10 +55,16 @@ def changed_window(before: NDArray[np.int8], after: NDArray[np.int8]) -> CellWin
     return CellWindow(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
 
 
-def occupancy_grid(view: GridView, frame_id: str, stamp: float, context: MessageContext) -> Message:
-    """Return costs of cells as a nav_msgs/OccupancyGrid, see ``occupancy_cells``."""
-    height, width = view.costs.shape
-    x_min, x_max, y_min, _ = view.extent
+def occupancy_grid(
+    cells: NDArray[np.int8],
+    extent: tuple[float, float, float, float],
+    frame_id: str,
+    stamp: float,
+    context: MessageContext,
+) -> Message:
+    """Return ``occupancy_cells`` (height, width) of a view with this extent as a nav_msgs/OccupancyGrid."""
+    height, width = cells.shape
+    x_min, x_max, y_min, _ = extent
     header = context.header(frame_id, stamp)
     return {
         "header": header,
@@ -69,7 +75,7 @@ def occupancy_grid(view: GridView, frame_id: str, stamp: float, context: Message
             "height": height,
             "origin": pose(Pose((x_min, y_min, 0.0))),
         },
-        "data": occupancy_cells(view.costs).reshape(-1),
+        "data": cells.reshape(-1),
     }
 
 

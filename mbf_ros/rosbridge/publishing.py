@@ -92,7 +92,8 @@ class Publisher:
         add = self._topics.add_output
         add("/cmd_vel", "geometry_msgs/TwistStamped" if self._stamped_commands else "geometry_msgs/Twist")
         for one in self._messages.outputs:
-            add(node_topic(one), one.type, latched=one.always, depth=one.depth)
+            outdates = self._outputs.get(one.outdates, "")
+            add(node_topic(one), one.type, one.always, one.depth, one.shared, outdates)
 
     def _audience(self, topic: str) -> Audience:
         return Audience(*self._topics.audience(self._outputs[topic]))

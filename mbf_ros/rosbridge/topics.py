@@ -46,13 +46,15 @@ class Subscription:
             self._wishes.clear()
         self._wishes.pop(wish_id, None)
         if not self._wishes:
-            self.end()
+            self.drop_waiting()
         return not self._wishes
 
-    def end(self) -> None:
-        """Send nothing more."""
+    def drop_waiting(self) -> None:
+        """Send nothing of what has been offered and still waits."""
         if self._timer is not None:
             self._timer.cancel()
+            self._timer = None
+        self._held.clear()
         self._client.outbox.forget(self._topic)
 
     def offer(self, text: str) -> None:
@@ -92,7 +94,11 @@ class Topic:
     type : str
         Full name of its messages.
     is_ours : bool
-        Whether only the navigator publishes it.
+        Whether the navigator publishes it.
+    is_shared : bool
+        Whether clients may publish what is ours, too.
+    outdates : str
+        Topic whose waiting messages are dropped when one of this is sent; of this one only the newest waits.
     on_message : callable, optional
         Takes what clients publish.
     latched : str, optional
@@ -107,6 +113,8 @@ class Topic:
 
     type: str
     is_ours: bool = False
+    is_shared: bool = False
+    outdates: str = ""
     on_message: Callable[[Message], None] | None = None
     latched: str | None = None
     keeps_last: bool = False
@@ -130,9 +138,24 @@ class TopicTable:
         return {name: self._topics[name].type for name in sorted(self._topics)}
 
     # ------------------------------------------------------------------------------------- for the navigator
-    def add_output(self, name: str, type_name: str, latched: bool = False, depth: int = DEPTH) -> None:
+    def add_output(
+        self,
+        name: str,
+        type_name: str,
+        latched: bool = False,
+        depth: int = DEPTH,
+        shared: bool = False,
+        outdates: str = "",
+    ) -> None:
         """Add a topic that the navigator publishes; a latched one sends its last message to new subscribers."""
-        self._topics[name] = Topic(full_name(type_name), is_ours=True, keeps_last=latched, depth=depth)
+        self._topics[name] = Topic(
+            full_name(type_name),
+            is_ours=True,
+            is_shared=shared,
+            outdates=outdates,
+            keeps_last=latched,
+            depth=depth,
+        )
 
     def add_input(self, name: str, type_name: str, on_message: Callable[[Message], None]) -> None:
         """Add a topic that the navigator listens to; ``on_message`` may raise MessageError."""
@@ -153,6 +176,9 @@ class TopicTable:
         topic = self._topics[name]
         if topic.keeps_last:
             topic.latched = text
+        if topic.outdates:
+            for subscription in self._topics[topic.outdates].subscriptions.values():
+                subscription.drop_waiting()
         for subscription in topic.subscriptions.values():
             subscription.offer(text)
 
@@ -160,7 +186,7 @@ class TopicTable:
     def advertise(self, client: Client, name: str, type_name: str, latched: bool) -> None:
         """Let a client publish a topic; raises OperationError where it is ours, or has another type."""
         topic = self._of_type(name, type_name)
-        if topic.is_ours:
+        if topic.is_ours and not topic.is_shared:
             raise OperationError(f"advertise: {name} is published by the navigator only")
         topic.keeps_last = topic.keeps_last or latched
         topic.publishers.add(client)
@@ -182,7 +208,7 @@ class TopicTable:
         topic = self._topics.get(name)
         if topic is None:
             raise OperationError(f"publish: {name} was not advertised, so its type is not known")
-        if topic.is_ours:
+        if topic.is_ours and not topic.is_shared:
             raise OperationError(f"publish: {name} is published by the navigator only")
         try:
             message = completed(topic.type, values) if topic.type in known_types() else values
@@ -201,7 +227,7 @@ class TopicTable:
         topic = self._of_type(name, type_name) if type_name or name not in self._topics else self._topics[name]
         subscription = topic.subscriptions.setdefault(client, Subscription(client, name, spelling, topic.depth))
         topic.newcomers += 1
-        subscription.wish(wish_id, throttle / 1000.0, queue)
+        subscription.wish(wish_id, throttle / 1000.0, 0 if topic.outdates else queue)
         if topic.latched is not None:
             subscription.offer(topic.latched)
 

@@ -160,6 +160,8 @@ class TileServer(MapServer):
         """Heights of all surfaces at a place, the lowest free one first; see ``ground.ground_heights``."""
         return self.tiled_map.ground_heights(x, y)
 
+    map_view_type = GridView
+
     @property
     def map_views(self) -> tuple[str, ...]:
         """Names of the layers, the one of the cost profile first."""

@@ -214,7 +214,9 @@ def test_the_action_interface_plans_on_tiles(tiled_hills, whole_hills, tmp_path)
 
 def test_the_picture_shows_the_highest_cost_of_every_pixel(tiled_hills, whole_hills, tmp_path):
     with LoopbackSession(Pose.planar(0.0, 0.0)) as session:
-        view = serve(session, tmp_path, config(tiled_hills)).map_view("steepness")
+        server = serve(session, tmp_path, config(tiled_hills))
+        view = server.map_view("steepness")
+    assert type(view) is server.map_view_type
     layer, vertices = whole_hills.map.layers["steepness"], whole_hills.map.vertices
     left, _, bottom, _ = view.extent
     side = (view.extent[1] - left) / view.costs.shape[1]

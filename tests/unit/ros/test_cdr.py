@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from mbf_abstract.maps.view import FieldView, GridView, MeshView
+from mbf_abstract.maps.view import FieldView, MeshView
 from mbf_ros.bags.writing import message_object
 from mbf_ros.messages import maps
 from mbf_ros.messages.cdr import serialized
@@ -19,7 +19,7 @@ MESH = MeshView(
     np.random.default_rng(1).random((5, 3)), np.int32([[0, 1, 2], [2, 3, 4]]), np.float32([0, 0.5, 2, 1, np.inf])
 )
 MESSAGES = {
-    "nav_msgs/OccupancyGrid": maps.occupancy_grid(GridView(np.eye(3), (0, 3, 0, 3)), "map", 1.0, CONTEXT),
+    "nav_msgs/OccupancyGrid": maps.occupancy_grid(np.eye(3, dtype=np.int8), (0, 3, 0, 3), "map", 1.0, CONTEXT),
     "map_msgs/OccupancyGridUpdate": maps.occupancy_grid_update(
         np.eye(3, dtype=np.int8), maps.CellWindow(0, 1, 3, 2), "odom", 2.0, CONTEXT
     ),

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mbf_abstract.maps.view import FieldView, GridView, MeshView
+from mbf_abstract.maps.view import FieldView, MeshView
 from mbf_ros.messages import maps
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import completed, fields_of
@@ -36,7 +36,7 @@ def test_what_is_forbidden_without_a_limit_is_an_obstacle_and_a_slight_cost_is_n
 
 def test_a_grid_lies_where_its_view_does():
     costs = np.float32([[0.0, 0.5, 1.0], [2.0, np.nan, 0.004]])
-    message = maps.occupancy_grid(GridView(costs, (-1.0, 0.5, 2.0, 3.0)), "map", 1.0, CONTEXT)
+    message = maps.occupancy_grid(maps.occupancy_cells(costs), (-1.0, 0.5, 2.0, 3.0), "map", 1.0, CONTEXT)
     assert message["data"].tolist() == [0, 49, 99, 100, -1, 1]
     info = message["info"]
     assert (info["width"], info["height"], info["resolution"]) == (3, 2, 0.5)
@@ -63,7 +63,7 @@ def test_an_update_of_the_changed_window_makes_one_grid_of_the_other(before, aft
 @pytest.mark.parametrize(
     ("kind", "message"),
     [
-        ("nav_msgs/OccupancyGrid", maps.occupancy_grid(GridView(np.zeros((2, 3)), (0, 3, 0, 2)), "map", 0.0, CONTEXT)),
+        ("nav_msgs/OccupancyGrid", maps.occupancy_grid(np.zeros((2, 3), np.int8), (0, 3, 0, 2), "map", 0.0, CONTEXT)),
         (
             "map_msgs/OccupancyGridUpdate",
             maps.occupancy_grid_update(np.zeros((2, 3), np.int8), maps.CellWindow(0, 0, 3, 1), "map", 0.0, CONTEXT),

@@ -33,7 +33,7 @@ MESH = """
 backend: mesh
 mesh_map: {mesh_file: floor.ply, inscribed_radius: 0.3, layers: [{name: area, type: keepout}],
   area: {regions: [{polygon: SPOT}]}}
-planners: [{name: shortest, type: dijkstra}]
+planners: [{name: shortest, type: dijkstra}, {name: wave, type: cvp}]
 controllers: [{name: follow, type: follow_path}]
 """
 GRID, UPDATES = "global_costmap/costmap", "global_costmap/costmap_updates"
@@ -49,14 +49,17 @@ class Site:
         self.session = LoopbackSession(Pose.planar(1.0, 1.0), self.clock)
         self.session.serve(*read_config(folder / "robot.yaml"), self.session.robot, self.session.transforms)
         self.server = self.session.navigator.server
-        self.messages = NavigatorMessages(
+        self.messages = self.new_messages()
+        self.types = {one.topic: one.type for one in self.messages.outputs}
+
+    def new_messages(self):
+        return NavigatorMessages(
             self.session,
             self.clock,
             lambda: MessageContext("map", 1000.0),
             lambda topic: self.listeners.get(topic, Audience(0, 0)),
             lambda: {"odom": ""},
         )
-        self.types = {one.topic: one.type for one in self.messages.outputs}
 
     def listen(self, *topics):
         for topic in topics:
@@ -86,7 +89,14 @@ both = pytest.mark.parametrize("site", ["costmap", "mesh"], indirect=True)
 @both
 def test_of_a_map_to_which_nobody_listens_no_view_is_made(site, monkeypatch):
     monkeypatch.setattr(type(site.server), "map_view", None)
-    assert site.changes() == {}
+    messages = site.new_messages()
+    assert [one.topic for one in messages.outputs] == list(site.types) and list(messages.changes()) == []
+    messages.close()
+
+
+@both
+def test_what_views_of_a_map_look_like_is_known_without_making_one(site):
+    assert all(isinstance(site.server.map_view(name), site.server.map_view_type) for name in site.server.map_views)
 
 
 @both
@@ -185,6 +195,21 @@ def test_a_mesh_comes_once_and_its_costs_when_they_change(site):
     assert not np.isinf(second["~/vertex_costs"]["mesh_vertex_costs"]["costs"]).any()
     site.listen("~/mesh")
     assert list(site.changes()) == ["~/mesh"]
+
+
+@pytest.mark.parametrize("site", ["mesh"], indirect=True)
+def test_the_directions_of_a_plan_come_once_and_again_to_whoever_comes_later(site):
+    field = "~/vector_field"
+    site.session.navigator.get_path(Pose.planar(3.0, 1.0), planner="wave")
+    assert list(site.changes()) == ["plan"]
+    site.listen(field)
+    first = site.changes()
+    assert list(first) == [field] and first[field]["markers"][0]["points"]
+    assert site.changes() == {}
+    site.listen(field)
+    assert list(site.changes()) == [field]
+    site.session.navigator.get_path(Pose.planar(1.0, 3.0), planner="wave")
+    assert list(site.changes()) == ["plan", field]
 
 
 @both
