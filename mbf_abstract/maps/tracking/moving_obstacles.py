@@ -12,6 +12,7 @@ because it may be wrong.
 from __future__ import annotations
 
 import math
+import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -80,7 +81,9 @@ class Sighting(NamedTuple):
 
 
 class MovingObstacles:
-    """The objects that a layer tracks.
+    """The objects that a layer tracks; any thread may ask for them while scans are taken in.
+
+    It has a lock of its own, as two maps may share it: a map whose part in memory follows the robot, and the next part.
 
     Parameters
     ----------
@@ -93,6 +96,7 @@ class MovingObstacles:
         self._tracker = Tracker(parameters, frame_id)
         self._watches = {name: SourceWatch(name) for name in parameters.sources}
         self._waiting: deque[RangeScan] = deque(maxlen=MAX_WAITING)
+        self._lock = threading.Lock()  # of the tracker
 
     def insert_scan(self, scan: RangeScan) -> None:
         """Keep a scan for the next update; may be called on any thread."""
@@ -101,17 +105,21 @@ class MovingObstacles:
 
     def take_in(self, parameters: MovingObstaclesParameters, obstacle_points: ObstaclePoints) -> Iterator[Sighting]:
         """Follow the objects through the scans that wait, one after the other; yield what each has shown."""
-        self._tracker.parameters = parameters
+        with self._lock:
+            self._tracker.parameters = parameters
         while self._waiting:
             scan = self._waiting.popleft()
             points = obstacle_points(_within(scan, parameters))
-            numbers = self._tracker.insert(points, scan.origin, scan.stamp)
+            with self._lock:
+                numbers = self._tracker.insert(points, scan.origin, scan.stamp)
+                of_moving = self._tracker.are_moving(numbers)
             self._watches[scan.source].used()
-            yield Sighting(points, self._tracker.are_moving(numbers))
+            yield Sighting(points, of_moving)
 
     def objects(self, now: float) -> tuple[TrackedObject, ...]:
         """The tracked objects at ``now`` [s]."""
-        return self._tracker.objects(now)
+        with self._lock:
+            return self._tracker.objects(now)
 
     def stale_reason(self, now: float, limit: float) -> str:
         """Which sensor is silent for longer than ``limit`` [s], or has sent nothing since a clearing."""
@@ -120,7 +128,8 @@ class MovingObstacles:
     def clear(self, within: Callable[[FloatArray], NDArray[np.bool_]] | None = None) -> None:
         """Forget the scans that wait and all objects, or those whose middles (n, 3) [m] are ``within`` an area."""
         self._waiting.clear()
-        self._tracker.clear(within)
+        with self._lock:
+            self._tracker.clear(within)
         for watch in self._watches.values():
             watch.cleared()
 
