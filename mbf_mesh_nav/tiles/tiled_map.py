@@ -113,12 +113,13 @@ class TiledMap:
         if sensed is self._sensed:
             return
         near = self.index.tiles_in(sensed.box) if len(sensed.numbers) else []
-        raised = {key: found for key in near if (found := self._with_sensed(key, sensed)) is not None}
-        freed = [key for key in self._raised if key not in raised]
+        raised = {key: found for key in near if (found := self._with_sensed(self.tile(key)[0], sensed)) is not None}
+        freed = {key: self._as_stored(tile) for key, (tile, _) in self._raised.items() if key not in raised}
+        # From here on nothing is read and nothing raises.
         self._sensed, self._raised = sensed, raised
-        for key in (*freed, *raised):
+        for key, weighed in (*freed.items(), *raised.items()):
             if self.pool.holds(key):
-                self.pool.reweigh(key, *self.tile(key))
+                self.pool.reweigh(key, *weighed)
 
     def find_place(self, position: FloatArray, reach: float) -> TilePlace | None:
         """The place on the surface nearest to a position (3,) [m], as ``borders.on_surface``; None off the surface.
@@ -161,18 +162,18 @@ class TiledMap:
         for place, profile in enumerate(self.index.profiles.values()):
             if (seen := self.index.layer_of(profile)) == row:
                 passing[place] = costs_between_portals(tile, tile.costs[seen], tile.lethal[seen], profile)
-        write_tile(tile_file(self.folder, key), replace(tile, portal_costs=passing))
+        tile = replace(tile, portal_costs=passing)
+        write_tile(tile_file(self.folder, key), tile)
         changed = TilePortals(tile.portals, passing[self._profile_row])
         self.portals.change(key, changed)
         self.estimates.change(key, self._estimated(changed))
         self._kept.pop(key, None)
-        if self._raised.pop(key, None) is not None and (raised := self._with_sensed(key, self._sensed)) is not None:
+        if self._raised.pop(key, None) is not None and (raised := self._with_sensed(tile, self._sensed)) is not None:
             self._raised[key] = raised
         self.pool.drop(key)
 
-    def _with_sensed(self, key: TileKey, sensed: SensedCosts) -> tuple[Tile, TileGraph] | None:
+    def _with_sensed(self, tile: Tile, sensed: SensedCosts) -> tuple[Tile, TileGraph] | None:
         """A tile and its weights with sensed costs; None if none of them is on it."""
-        tile, _ = self.tile(key)
         stored = tile.costs[self._layer], tile.lethal[self._layer]
         values = sensed.laid_over(tile.numbers[: tile.core_vertices], *stored)
         return None if values is None else (tile, tile_graph(tile, *values, self.profile))
@@ -183,7 +184,9 @@ class TiledMap:
         return TilePortals(bounds.portals, costs)
 
     def _read(self, key: TileKey) -> tuple[Tile, TileGraph]:
-        tile = sound_tile(self.folder, self.index, key)
+        return self._as_stored(sound_tile(self.folder, self.index, key))
+
+    def _as_stored(self, tile: Tile) -> tuple[Tile, TileGraph]:
         return tile, tile_graph(tile, tile.costs[self._layer], tile.lethal[self._layer], self.profile)
 
     def _read_portals(self, key: TileKey) -> TilePortals:

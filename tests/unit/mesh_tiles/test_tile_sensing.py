@@ -1,5 +1,6 @@
 """What sensors see on a map of tiles: marked in a window that follows the robot, as on the whole mesh."""
 
+import contextlib
 import shutil
 
 import numpy as np
@@ -19,6 +20,8 @@ from mbf_mesh_nav.layers.obstacle import ObstacleParameters
 from mbf_mesh_nav.map.map_builder import MeshLayerEntry
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.planners.hierarchical import HierarchicalPlanner
+from mbf_mesh_nav.tiles.planning import plan_on_tiles
+from mbf_mesh_nav.tiles.sensed import SensedCosts
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
 from mbf_mesh_nav.tiles.serving.window_settings import MOVES_AT, SHOWN, window_settings
 from mbf_mesh_nav.tiles.tile import tile_file
@@ -308,6 +311,44 @@ def test_a_tile_that_changes_keeps_what_was_sensed_on_it(tiled_hills, way, tmp_p
     assert blocked.outcome == still.outcome == GetPathOutcome.BLOCKED_GOAL
     assert "lethal in layer obstacles, around, shown" in still.message
     assert tiled.point_check()(pose(way[12])).state == CellState.LETHAL
+
+
+def test_a_tile_that_cannot_be_read_again_takes_no_obstacle_out_of_the_plan(tiled_hills, whole_hills, tmp_path):
+    """What was seen on one tile is forgotten while its file is damaged, and something is seen on another one."""
+    folder = shutil.copytree(tiled_hills, tmp_path / "map")
+    tiled, fresh = TiledMap(folder), TiledMap(folder)
+    places = whole_hills.map.vertices[~whole_hills.blocked]
+    start, goal = (places[np.argmin(((places[:, :2] - xy) ** 2).sum(axis=1))] for xy in ((6.0, 8.0), (30.0, 30.0)))
+    before = plan_on_tiles(tiled, start, goal)
+    first, second = (seen_on_tiles(tiled, before.positions[len(before.positions) // share]) for share in (8, 2))
+    tiled.lay_over(first)
+    plan_on_tiles(tiled, start, goal)
+    ((key, _),) = tiled._raised.items()
+    tiled._kept.clear()
+    sound = tile_file(folder, key).read_bytes()
+    tile_file(folder, key).write_bytes(b"none")
+    with contextlib.suppress(MeshError):
+        tiled.lay_over(second)
+    tile_file(folder, key).write_bytes(sound)
+    for one in (tiled, fresh):
+        one.lay_over(second)
+    ours, exact = (plan_on_tiles(one, start, goal) for one in (tiled, fresh))
+    assert ours.cost == exact.cost != before.cost and np.array_equal(ours.positions, exact.positions)
+
+
+def seen_on_tiles(tiled, place):
+    """Lethal vertices within 0.8 m of a place, as a window would find them."""
+    reach = 0.8
+    box = (*(place - reach).tolist(), *(place + reach).tolist())
+    (core,) = (
+        (tile.numbers[: tile.core_vertices], tile.vertices[: tile.core_vertices])
+        for tile in (tiled.tile(key)[0] for key in tiled.index.tiles_in(box))
+        if (tile.vertices[: tile.core_vertices] == place).all(axis=1).any()
+    )
+    numbers, vertices = core
+    near = np.flatnonzero(((vertices - place) ** 2).sum(axis=1) < reach**2)
+    values = np.full(len(near), np.inf, dtype=np.float32), np.ones(len(near), dtype=np.bool_)
+    return SensedCosts.at(numbers[near], *values, vertices[near])
 
 
 # --------------------------------------------------------------------------------------------------- settings
