@@ -1,4 +1,4 @@
-"""Tracked objects are asked for on other threads, while a scan is taken in: by the guard before contact, and viewers."""
+"""Tracked objects are asked for on other threads while a scan is taken in: by the guard before contact, by viewers."""
 
 import threading
 
