@@ -6,7 +6,7 @@ Messages are made and written when somebody listens, once for all. Everything he
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,8 +18,10 @@ from terrain.viewer.logs.foxglove_messages import nanoseconds
 from terrain.viewer.logs.run_messages import TOPICS, Stamped, bytes_of, json_schema
 
 NUMBERS = {topic: number for number, topic in enumerate(TOPICS, 1)}
-WAITING = dict.fromkeys(TOPICS, 1000) | {"/tf": 100, "/scan": 10, "/map": 1, "/mesh_map": 1}
-"""How many messages of a topic, or of each part of its state, wait for a slow client; older ones are dropped."""
+HISTORY = 1000
+"""How many messages of a topic without a state wait for a slow client; older ones are dropped."""
+WAITING = {"/tf": 100, "/actions": 100, "/scan": 10, "/objects": 10}
+"""How many of a state, whose messages are small or few; of the others the newest of each part."""
 TIME = "time"
 
 
@@ -52,13 +54,21 @@ class Written:
         if self._payload is None:
             self._payload = bytes_of(self._make())
         frame = message_data(client.subscriptions[self.topic], self.stamp, self._payload)
-        client.outbox.newest((self.topic, self.part), frame, WAITING[self.topic])
+        keep = WAITING.get(self.topic, 1) if self.part is not None else HISTORY
+        client.outbox.newest((self.topic, self.part), frame, keep)
 
 
 class Channels:
-    """The table of channels."""
+    """The table of channels.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    on_fault : callable
+        Takes why a message could not be made; the others are sent.
+    """
+
+    def __init__(self, on_fault: Callable[[Exception], None]) -> None:
+        self._on_fault = on_fault
         self._state: dict[str, dict[str, Written]] = {topic: {} for topic in TOPICS}
         self._clients: set[FoxgloveClient] = set()
 
@@ -79,7 +89,7 @@ class Channels:
                 self._state[one.topic].pop(one.part, None)  # so that the newest comes last
                 self._state[one.topic][one.part] = written
             for client in listeners:
-                written.put(client)
+                self._put(written, client)
         if newest is not None:
             for client in self._clients:
                 client.outbox.newest(TIME, server_time(nanoseconds(newest)))
@@ -101,7 +111,7 @@ class Channels:
             raise ProtocolError(f"subscription {subscription}: its number is used, or {topic} is subscribed to already")
         client.subscriptions[topic] = subscription
         for written in self._state[topic].values():
-            written.put(client)
+            self._put(written, client)
 
     def unsubscribe(self, client: FoxgloveClient, subscription: int) -> None:
         """End a subscription, and drop what waits of it."""
@@ -111,6 +121,12 @@ class Channels:
         del client.subscriptions[topic]
         for kind in [(topic, None), *((topic, part) for part in self._state[topic])]:
             client.outbox.forget(kind)
+
+    def _put(self, written: Written, client: FoxgloveClient) -> None:
+        try:
+            written.put(client)
+        except Exception as error:
+            self._on_fault(error)
 
 
 def _schema(topic: str) -> dict[str, str]:

@@ -12,6 +12,7 @@ from typing import Protocol
 
 from mbf_abstract.access.foxglove import FoxgloveOptions, report_addresses
 from mbf_abstract.access.web_socket_server import Offer, ServerOptions, WebSocketServer
+from mbf_abstract.event_values import error_text
 from mbf_abstract.events import Event, EventBus
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.pace import Pace
@@ -26,6 +27,7 @@ from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.orderly_end import orderly_ctrl_c
 
 PART_PERIOD = 0.05  # s of wall time at least between two parts
+MOST_FAULTS = 20  # that are noted
 SOURCE = "foxglove"
 Note = Callable[[str], None]
 
@@ -43,6 +45,21 @@ class ServerNotes:
 
     def close(self) -> None:
         """Do nothing."""
+
+
+class Faults:
+    """Notes what has gone wrong, each text once and not without end."""
+
+    def __init__(self, note: Note) -> None:
+        self._note = note
+        self._known: set[str] = set()
+
+    def __call__(self, error: Exception) -> None:
+        """Note a fault, unless its text is known."""
+        text = f"{SOURCE}: {type(error).__name__}: {error_text(error)}"
+        if text not in self._known and len(self._known) < MOST_FAULTS:
+            self._known.add(text)
+            self._note(text)
 
 
 class Feed(Protocol):
@@ -83,7 +100,8 @@ class LiveServer:
         self._feed, self._note, self._options = feed, note, options
         self._wall = WallClock()
         self._next_part = 0.0
-        self._service = FoxgloveService(name, steering, self._post, note, began)
+        self._faults = Faults(note)
+        self._service = FoxgloveService(name, steering, self._post, self._faults, began)
         offer = Offer(SOURCE, extra="foxglove", origin_option="--foxglove-origin", subprotocols=SUBPROTOCOLS)
         self._server = WebSocketServer(self._service, EventBus(self._wall.now, [ServerNotes(note)]), options, offer)
 
@@ -107,7 +125,11 @@ class LiveServer:
 
     def send_part(self) -> None:
         """Hand on the next part; on the thread that looks."""
-        part = self._feed.part()
+        try:
+            part = self._feed.part()
+        except Exception as error:  # the robot drives on, and the next part may be fine
+            self._faults(error)
+            return
         if part is not None:
             self._service.is_ready = False
             self._server.post(self._service.publish, part)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
@@ -75,7 +76,7 @@ class SteeredRobot:
 
     def __init__(self, session: NavigationSession, send: Callable[[MoveBaseGoal], Any]) -> None:
         self._server, self._send = session.navigator.server, send
-        self._holding = False
+        self._holding, self._lock = False, threading.Lock()  # two threads pause goals
 
     def go_to(self, goal: Pose) -> None:
         """Send a goal, which a newer one takes over; raises ProtocolError where it is not taken."""
@@ -92,13 +93,15 @@ class SteeredRobot:
 
     def hold(self, holding: bool) -> None:
         """Pause all goals, those to come as well, or let them go on."""
-        self._holding = holding
-        if holding:
-            self._server.pause_all()
-        else:
-            self._server.resume_all()
+        with self._lock:
+            self._holding = holding
+            if holding:
+                self._server.pause_all()
+            else:
+                self._server.resume_all()
 
     def keep_holding(self) -> None:
         """Pause goals that have come since the last look."""
-        if self._holding:
-            self._server.pause_all()
+        with self._lock:
+            if self._holding:
+                self._server.pause_all()

@@ -74,12 +74,12 @@ class RobotFeed:
         except RobotStateError:
             return None
         velocity = self._velocity()
+        grids, meshes = self._changed_maps(now)  # first: where it raises, what has come waits for the next part
         recorder = Recorder(self._name, self._server.config.backend, self._shape, pose, [])
         recorder.sample(now + self._epoch, pose, velocity or Twist(), runtime.gate.last_command)
         while self._plans:
             recorder.path(*self._plans.popleft())
         self._place_scans(recorder)
-        grids, meshes = self._changed_maps(now)
         part = replace(recorder.finish(events=self._events.take(), began=-self._epoch), grids=grids, meshes=meshes)
         return part if velocity is not None else replace(part, twists=np.full_like(part.twists, np.nan))
 

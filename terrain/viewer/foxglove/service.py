@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from mbf_abstract.access.outbox import Frame
@@ -24,6 +24,8 @@ STEERING = (*WATCHING, "clientPublish", "services")
 TRIGGER = "std_srvs/srv/Trigger"
 REQUEST = {"type": "object"}
 RESPONSE = {"type": "object", "properties": {"success": {"type": "boolean"}, "message": {"type": "string"}}}
+MOST_PROBLEMS = 5  # of one operation that are named
+UNHEARD = "unheard"
 Operation = dict[str, Any]
 
 
@@ -53,14 +55,14 @@ class FoxgloveService:
         name: str,
         steering: Steering,
         post: Callable[..., None],
-        on_fault: Callable[[str], None],
+        on_fault: Callable[[Exception], None],
         began: float = 0.0,
     ) -> None:
         self.is_ready = True
         self._name, self._steering, self._post, self._began = name, steering, post, began
         self._on_fault = on_fault
         self._session_id = secrets.token_hex(8)
-        self._channels = Channels()
+        self._channels = Channels(on_fault)
         self._messages: RunMessages | None = None
         self._operations: dict[str, Callable[[FoxgloveClient, Operation], None]] = {
             "subscribe": self._subscribe,
@@ -78,7 +80,7 @@ class FoxgloveService:
             self._messages = self._messages or RunMessages(part, self._began)
             self._channels.publish(self._messages.take(part))
         except Exception as error:  # the next part may be fine
-            self._on_fault(f"foxglove: {type(error).__name__}: {error_text(error)}")
+            self._on_fault(error)
         finally:
             self.is_ready = True
 
@@ -144,30 +146,41 @@ class FoxgloveService:
 
     # ------------------------------------------------------------------------------------------------ operations
     def _subscribe(self, client: FoxgloveClient, operation: Operation) -> None:
-        for one in list_in(operation, "subscriptions"):
+        def subscribe(one: Any) -> None:
             self._channels.subscribe(client, number_in(one, "channelId"), number_in(one, "id"))
 
+        _for_each(list_in(operation, "subscriptions"), subscribe)
+
     def _unsubscribe(self, client: FoxgloveClient, operation: Operation) -> None:
-        for number in list_in(operation, "subscriptionIds"):
+        def unsubscribe(number: Any) -> None:
             self._channels.unsubscribe(client, number_in({"id": number}, "id"))
+
+        _for_each(list_in(operation, "subscriptionIds"), unsubscribe)
 
     def _advertise(self, client: FoxgloveClient, operation: Operation) -> None:
         """Take messages on topics of ours; the app announces others, too, which nobody listens to."""
         _require_steering(client)
-        for one in list_in(operation, "channels"):
+
+        def advertise(one: Any) -> None:
             number, topic = number_in(one, "id"), text_in(one, "topic")
             if topic not in INPUTS:
-                raise ProtocolError(f"{topic!r}: nobody listens; goals come on {' and '.join(INPUTS)}")
+                text = f"{topic[:80]!r}: nobody listens; goals come on {' and '.join(INPUTS)}"
+                client.outbox.newest(UNHEARD, protocol.status(Level.INFO, text))
+                return
             if text_in(one, "encoding") != "json":
                 raise ProtocolError(f"{topic!r}: expected the encoding json")
             client.inputs[number] = topic
 
+        _for_each(list_in(operation, "channels"), advertise)
+
     def _unadvertise(self, client: FoxgloveClient, operation: Operation) -> None:
-        for number in list_in(operation, "channelIds"):
+        def unadvertise(number: Any) -> None:
             client.inputs.pop(number_in({"id": number}, "id"), None)
 
+        _for_each(list_in(operation, "channelIds"), unadvertise)
+
     def _get_parameters(self, client: FoxgloveClient, operation: Operation) -> None:
-        names = [text_in({"name": name}, "name") for name in list_in(operation, "parameterNames")]
+        names = {text_in({"name": name}, "name") for name in list_in(operation, "parameterNames")}
         client.outbox.answer(protocol.parameter_values(self._steering.parameters(names), _request(operation)))
 
     def _set_parameters(self, client: FoxgloveClient, operation: Operation) -> None:
@@ -181,6 +194,8 @@ class FoxgloveService:
                 self._steering.set_parameters(changes)
             except ValueError as error:
                 problem = error_text(error)
+            except Exception as error:  # of a plugin that was changed; the app waits for an answer
+                problem = f"{type(error).__name__}: {error_text(error)}"
             self._post(self._answer_change, client, list(changes), request, problem)
 
         self._steering.post(change)
@@ -190,6 +205,19 @@ class FoxgloveService:
         if problem:
             _report(client, problem)
         client.outbox.answer(protocol.parameter_values(self._steering.parameters(names), request))
+
+
+def _for_each(items: Iterable[Any], take: Callable[[Any], None]) -> None:
+    """Take each; raises ProtocolError, for the first ones that are wrong, once the others have been taken."""
+    problems = []
+    for one in items:
+        try:
+            take(one)
+        except ProtocolError as error:
+            problems.append(str(error))
+    if problems:
+        more = f"; and {len(problems) - MOST_PROBLEMS} more" if len(problems) > MOST_PROBLEMS else ""
+        raise ProtocolError("; ".join(problems[:MOST_PROBLEMS]) + more)
 
 
 def _require_steering(client: FoxgloveClient) -> None:

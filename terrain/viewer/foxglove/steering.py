@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from mbf_abstract.config.navigation_parameters import NavigationParameters
@@ -67,7 +67,7 @@ class Steering:
         else:
             self.post(lambda: _ignore(self._hold(service == PAUSE)))
 
-    def parameters(self, names: list[str]) -> dict[str, Any]:
+    def parameters(self, names: Collection[str]) -> dict[str, Any]:
         """Return the navigation's parameters of these names, of all without any; infinity is None."""
         found = self._server.runtime.parameters.model_dump(mode="json")
         return {name: _plain(value) for name, value in found.items() if name in names or not names}

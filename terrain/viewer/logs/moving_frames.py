@@ -16,6 +16,7 @@ from terrain.viewer.logs import foxglove_scene as scene
 from terrain.viewer.scene import wheel_angles
 
 TRACK_PIECE = 5.0  # s
+STANDING = 0.05  # m within which a robot that stands is shown by an unsteady localisation
 
 
 class MovingFrames:
@@ -67,29 +68,39 @@ class MovingFrames:
 
 
 class Track:
-    """Cuts the driven track into pieces of ``TRACK_PIECE`` seconds; each has its number, end [s] and points."""
+    """Cuts the driven track into pieces of ``TRACK_PIECE`` seconds; each has its number, end [s] and points.
+
+    While the robot stands there are none.
+    """
 
     def __init__(self) -> None:
         self._number = 0
-        self._origin: float | None = None
+        self._due = math.inf
         self._times: list[float] = []  # from the last sample of the piece before on
         self._points: list[list[float]] = []
 
     def take(self, times: FloatArray, poses: FloatArray) -> Iterator[tuple[int, float, FloatArray]]:
         """Yield the pieces that end with one of these samples."""
         for time, point in zip(times.tolist(), poses[:, :3].tolist(), strict=True):
-            self._origin = time if self._origin is None else self._origin
+            is_set_back = bool(self._times) and time < self._times[-1]
             self._times.append(time)
             self._points.append(point)
-            if time - self._origin >= TRACK_PIECE * (self._number + 1):
+            if len(self._times) == 1:
+                self._due = time + TRACK_PIECE
+            elif time >= self._due or is_set_back:
                 yield from self.end()
+                self._due = time + TRACK_PIECE
 
     def end(self) -> Iterator[tuple[int, float, FloatArray]]:
         """Yield what has been driven since the last piece, if anything."""
-        if len(self._times) > 1:
-            yield self._number, self._times[-1], np.array(self._points)
-            self._times, self._points = self._times[-1:], self._points[-1:]
+        if not self._times:
+            return
+        points = np.array(self._points)
+        if np.ptp(points, axis=0).max() >= STANDING:
+            yield self._number, self._times[-1], points
+            self._points = self._points[-1:]
             self._number += 1
+        self._times, self._points = self._times[-1:], self._points[:1]
 
 
 def _about_y(angle: float) -> FloatArray:

@@ -50,7 +50,7 @@ from terrain.viewer.reports.timeline import ACTIONS
 
 ERRORS = {EventKind.FAULT, EventKind.QUARANTINE, EventKind.SINK_FAILED}
 DETAILS = {EventKind.STATE_CHANGED, EventKind.PLUGIN_CALL_STARTED, EventKind.PLUGIN_CALL_ENDED}
-MAX_PIECES = 10_000  # of the track, 14 hours; then the oldest are replaced
+MAX_PIECES = 2000  # of the track, some three hours of driving; then the oldest are replaced
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 MOTION = ("speed", "commanded_speed", "yaw_rate", "commanded_yaw_rate", "tilt_deg", "cross_track_error")
 JSON_FIELDS: dict[str, dict[str, Any]] = {
@@ -156,7 +156,9 @@ class RunMessages:
             self._events(part.events),
             self._motion(part),
         ]
-        return _in_order(itertools.chain(*streams))
+        messages = _in_order(itertools.chain(*streams))
+        self._scene = None  # only now: where a part cannot be made, the next one opens
+        return messages
 
     def end(self) -> list[Stamped]:
         """Return what is left at the end: the last piece of the track."""
@@ -167,7 +169,6 @@ class RunMessages:
         if self._scene is not None:
             yield from self._scene
             yield _json(self._began, "/actions", "mbf.ActionStates", self._actions.states, part="")
-            self._scene = None
 
     def _moving_frames(self, part: Recording) -> Iterator[Stamped]:
         for time, make in self._moving.take(part):
@@ -175,9 +176,8 @@ class RunMessages:
 
     def _pieces(self, pieces: Iterable[tuple[int, float, Any]]) -> Iterator[Stamped]:
         for number, time, line in pieces:
-            yield Stamped(
-                time, "/scene", partial(scene.track_piece, self._frame, number, time, line), f"track {number}"
-            )
+            place = number % MAX_PIECES
+            yield Stamped(time, "/scene", partial(scene.track_piece, self._frame, place, time, line), f"track {place}")
 
     def _plans(self, part: Recording) -> Iterator[Stamped]:
         for time, line in part.paths:

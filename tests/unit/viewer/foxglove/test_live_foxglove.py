@@ -192,6 +192,38 @@ def test_rubbish_is_answered_and_the_connection_stays(idle_app, frame, text):
     assert idle_app.operation("parameterValues")["parameters"] == [{"name": "global_frame", "value": "map"}]
 
 
+def test_one_wrong_entry_of_a_list_drops_no_other(served, client):
+    app = client(served())
+    channels = [{"id": 1, "topic": topic, "encoding": "json"} for topic in ("/initialpose", "/clicked_point")]
+    channels[1]["id"] = 2
+    app.send({"op": "advertise", "channels": channels})
+    answer = app.operation("status")
+    assert "nobody listens" in answer["message"] and answer["level"] == 0
+    events = app.channel("/events")["id"]
+    subscriptions = [{"id": 1, "channelId": 999}, {"id": 100 + events, "channelId": events}]
+    app.send({"op": "subscribe", "subscriptions": subscriptions})
+    assert "there is no channel 999" in app.operation("status")["message"]
+    app.until(lambda: finished(app))
+    app.send(struct.pack("<BI", 1, 2) + json.dumps({**HERE, "point": {"x": 9.0, "y": 2.0, "z": 0.0}}).encode())
+    app.until(lambda: len(finished(app)) == 2)
+    app.send({"op": "unsubscribe", "subscriptionIds": [999, 100 + events]})
+    assert "there is no subscription 999" in app.operation("status")["message"]
+    app.subscribe("/events")
+
+
+def test_a_change_that_a_plugin_does_not_survive_is_answered(served, client, monkeypatch):
+    run = served()
+    app = client(run)
+
+    def fail(**changes):
+        raise RuntimeError("the plugin is broken")
+
+    monkeypatch.setattr(run.session.navigator.server, "set_parameters", fail)
+    app.send({"op": "setParameters", "parameters": [{"name": "planner_patience", "value": 7.5}], "id": "mine"})
+    assert app.operation("parameterValues")["id"] == "mine"
+    assert app.operation("status")["message"] == "RuntimeError: the plugin is broken"
+
+
 @pytest.mark.parametrize(
     ("message", "text"),
     [

@@ -17,6 +17,7 @@ from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.server.factory import read_config
 from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_abstract.time.clock import WallClock, unix_seconds
+from terrain.viewer.foxglove.robot import SteeredRobot
 from terrain.viewer.foxglove.robot_feed import RobotFeed
 
 CONFIG = """
@@ -178,6 +179,53 @@ def test_a_server_that_is_closed_looks_at_nothing_and_listens_no_more_whatever_i
     assert threading.current_thread() not in parts, "its feed is looked at on one thread only"
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection(("127.0.0.1", served.live.port))
+
+
+def test_who_pauses_and_who_resumes_take_turns(robot):
+    session = robot().session
+    server, held = session.navigator.server, SteeredRobot(session, session.navigator.send)
+    pauses, resumed = server.pause_all, threading.Event()
+    resuming = threading.Thread(target=lambda: (held.hold(False), resumed.set()))
+
+    def slow_pause():
+        resuming.start()
+        overtaken = resumed.wait(0.5)
+        assert not overtaken, "the goals are paused after they were let go"
+        return pauses()
+
+    held.hold(True)
+    server.pause_all = slow_pause
+    try:
+        held.keep_holding()
+    finally:
+        del server.pause_all
+        resuming.join()
+
+
+def test_a_fault_of_the_feed_is_noted_once_and_loses_nothing_that_waits(robot, client, monkeypatch):
+    served = robot()
+    server, app = served.session.navigator.server, client(served)
+    looked = threading.Semaphore(0)
+
+    def damaged():
+        looked.release()
+        raise RuntimeError("a damaged tile")
+
+    monkeypatch.setattr(server, "map_view", damaged)
+    feed = RobotFeed(served.session, "loopback")
+    feed._take_scan(RangeScan.of_rays("eye", np.zeros(3), np.eye(3), [True] * 3, served.session.clock.now()))
+    with pytest.raises(RuntimeError):
+        feed.part()
+    assert len(feed.part().scans) == 1, "the scan has waited"
+    feed.close()
+    for _ in range(4):
+        served.live._feed._next_map = 0.0
+        assert looked.acquire(timeout=60.0)
+
+    app.subscribe("/tf")
+    assert app.newest("/tf")
+    assert sum("damaged tile" in note for note in served.notes) == 1
+    assert EventKind.FAULT not in [event.kind for event in served.session.memory.events]
 
 
 def test_a_goal_that_is_not_taken_is_answered_with_the_reason(robot, client):
