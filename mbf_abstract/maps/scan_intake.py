@@ -21,7 +21,7 @@ from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.sensing import MAX_STAMP_LEAD, RangeScan
 from mbf_abstract.maps.served_map import ServedMap
 
 MAX_REPORTED = 100
@@ -42,8 +42,9 @@ class ScanIntake:
     Attributes
     ----------
     newest : dict of str to RangeScan
-        The newest scan of each source, in the frame it came in, also of sources that no layer listens to; for plugins
-        that look at scans themselves. Arrays are copies.
+        The newest scan of each source by its stamp, in the frame it came in, also of sources that no layer listens to;
+        for plugins that look at scans themselves. A scan that all maps refuse is not kept, nor one without a finite
+        ray. Arrays are copies, the ones that the layers have.
     """
 
     def __init__(self, runtime: Runtime, maps: Mapping[str, ServedMap[Any]]) -> None:
@@ -53,7 +54,9 @@ class ScanIntake:
         self.newest: dict[str, RangeScan] = {}
 
     def take(self, scan: RangeScan) -> None:
-        """Insert a scan into every map that listens to its source and can place it.
+        """Insert a scan into every map that listens to its source and can place it; it is copied once.
+
+        A scan of rays only whose ends are not finite is ignored.
 
         Raises
         ------
@@ -64,17 +67,27 @@ class ScanIntake:
         """
         if not math.isfinite(scan.stamp):
             raise ValueError(f"the stamp of a scan must be finite, got {scan.stamp} from source {scan.source!r}")
-        if scan.source in self.newest or len(self.newest) < MAX_SOURCES:
-            self.newest[scan.source] = scan.checked()
-        listening = [name for name, served in self._maps.items() if served.map.listens_to(scan.source)]
+        seen = scan.checked()
+        listening = [name for name, served in self._maps.items() if served.map.listens_to(seen.source)]
         if not listening:
-            self._report_unknown(scan.source)
+            self._report_unknown(seen.source)
+        if len(scan.ends) and not len(seen.ends):
             return
-        refused = {name: error for name in listening if (error := self._insert(name, scan)) is not None}
-        if len(refused) == len(listening):
+        refused = {name: error for name in listening if (error := self._insert(name, seen)) is not None}
+        if refused and len(refused) == len(listening):
             raise refused[listening[0]]
         for name in listening:
-            self._report_refused(name, scan.source, refused.get(name))
+            self._report_refused(name, seen.source, refused.get(name))
+        self._keep(seen)
+
+    def _keep(self, scan: RangeScan) -> None:
+        """Keep a scan unless a newer one has come; a stamp from the future does not keep those of now out."""
+        kept = self.newest.get(scan.source)
+        latest = self._runtime.clock.now() + MAX_STAMP_LEAD
+        if kept is None and len(self.newest) >= MAX_SOURCES:
+            return
+        if kept is None or scan.stamp >= kept.stamp or kept.stamp > latest:
+            self.newest[scan.source] = scan
 
     def _insert(self, name: str, scan: RangeScan) -> TransformError | None:
         served = self._maps[name]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +37,8 @@ class RangeScan:
         Whether the ray hit something.
     stamp : float
         Time of the measurement [s].
+    is_checked : bool
+        Whether the arrays are those that ``checked`` has copied, or were made of them; nobody writes to them.
     """
 
     source: str
@@ -45,6 +47,7 @@ class RangeScan:
     ends: FloatArray
     hits: NDArray[np.bool_]
     stamp: float
+    is_checked: bool = field(default=False, kw_only=True, repr=False)
 
     @classmethod
     def of_rays(
@@ -77,17 +80,23 @@ class RangeScan:
     def checked(self) -> RangeScan:
         """A copy as arrays, as a driver may reuse its buffers, without the rays whose end is not finite.
 
+        A scan that is such a copy is returned as it is.
+
         Raises
         ------
         ValueError
             Wrong shapes, or origin or stamp are not finite.
         """
+        if self.is_checked:
+            return self
         scan = RangeScan.of_rays(self.source, self.origin, self.ends, self.hits, self.stamp, self.frame_id)
         if not (np.isfinite(scan.origin).all() and math.isfinite(scan.stamp)):
             origin = scan.origin.tolist()
             raise ValueError(f"origin and stamp of a scan must be finite, got {origin} and {self.stamp}")
         known = np.asarray(np.isfinite(scan.ends).all(axis=1))
-        return scan if known.all() else replace(scan, ends=scan.ends[known], hits=scan.hits[known])
+        if not known.all():
+            scan = replace(scan, ends=scan.ends[known], hits=scan.hits[known])
+        return replace(scan, is_checked=True)
 
     def between_heights(self, lowest: float, highest: float) -> RangeScan:
         """The scan without the rays that end below ``lowest`` or above ``highest`` [m]."""

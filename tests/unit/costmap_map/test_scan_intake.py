@@ -175,6 +175,38 @@ def test_the_newest_scan_of_every_source_is_kept_as_a_copy_also_where_no_layer_l
     assert np.array_equal(server.scans["lidar"].ends, second.ends)
 
 
+def test_neither_a_late_scan_nor_a_blind_one_nor_one_that_is_refused_replaces_a_newer_one(site):
+    server, transforms, _ = site
+    transforms.set(CONNECTED)
+    for stamp in (0.0, 0.2):
+        transforms.set(turned(0.0, stamp))
+    server.take_scan(ahead(0.2))
+    server.take_scan(ahead(0.1))
+    with pytest.raises(TransformError):
+        server.take_scan(ahead(7.0))
+    server.take_scan(RangeScan("lidar", "laser", (0.05, 0.05, 0.1), [(math.nan, 0.0, 0.0)], [True], 0.2))
+    assert server.scans["lidar"].stamp == 0.2 and len(server.scans["lidar"].ends) == 1
+
+
+def test_a_stamp_from_the_future_does_not_keep_the_scans_of_now_out(site):
+    server, transforms, _ = site
+    transforms.set(CONNECTED)
+    for stamp in (60.0, 0.0):
+        server.take_scan(ahead(stamp, frame="drift"))
+    assert server.scans["lidar"].stamp == 0.0
+
+
+def test_a_scan_is_copied_once_for_all_who_look_at_it(site, monkeypatch):
+    server, transforms, _ = site
+    transforms.set(CONNECTED)
+    (layer,) = (one for one in server.local_costmap.layers.values() if one.source_names)
+    taken = []
+    monkeypatch.setattr(layer, "insert_scan", taken.append)
+    scan = RangeScan.of_points("lidar", [(2.0, 0.0, 0.1)], (0.0, 0.0, 0.1), 0.0, "drift")
+    server.take_scan(scan)
+    assert taken[0].ends is server.scans["lidar"].ends and taken[0].ends is not scan.ends
+
+
 def test_sources_without_end_do_not_fill_the_memory(site):
     server, _, _ = site
     for number in range(MAX_SOURCES + 5):
