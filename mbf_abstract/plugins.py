@@ -198,10 +198,13 @@ class ControlRequest:
 class ControlResult(PluginResult):
     """Answer of a controller: an outcome of ``ExePathOutcome`` (or a plugin's own), a text and the command.
 
-    The command is sent only if the outcome is a success; ``None`` then counts as NO_VALID_CMD.
+    The command is sent only if the outcome is a success; ``None`` then counts as NO_VALID_CMD. ``hindered_by`` is a
+    text on the moving object without which the robot would drive on: as long as its command hardly moves it, it waits
+    for that object, and the path counts as blocked after the ``max_wait`` of the map's layer.
     """
 
     command: Command | None = None
+    hindered_by: str = ""
 
 
 @dataclass(frozen=True, eq=False)

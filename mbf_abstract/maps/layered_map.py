@@ -13,7 +13,7 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.maps.tracking.contact import ContactParameters, safe_share
+from mbf_abstract.maps.tracking.contact import ContactParameters, in_the_way, safe_share
 from mbf_abstract.maps.tracking.objects import TrackedObject
 
 
@@ -101,9 +101,14 @@ class LayeredMap(NavigationMap):
                 continue
             share, touched = safe_share(self.robot_box, pose, velocity, command, objects, limits)
             if touched is not None and share < least[0]:
-                text = f"object {touched.number} moves in the way, at ({touched.x:.2f}, {touched.y:.2f})"
-                least = share, text, limits.max_wait
+                least = share, in_the_way(touched), limits.max_wait
         return least
+
+    @property
+    def max_wait(self) -> float:
+        """The least that any layer with moving objects allows."""
+        limits = [layer.parameters for layer in self.layers.enabled]
+        return min((limit.max_wait for limit in limits if isinstance(limit, ContactParameters)), default=math.inf)
 
     def set_layer_parameters(self, name: str, parameters: Any, until: float = math.inf) -> None:
         """Replace the parameters of one layer, all or none.

@@ -154,6 +154,11 @@ class NavigationMap(ABC):
         """
         return 1.0, "", 0.0
 
+    @property
+    def max_wait(self) -> float:
+        """How long [s] a robot may wait for what moves before its path counts as blocked."""
+        return math.inf
+
     # -------------------------------------------------------------------------------------------------- layers
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
         """Remove what sensors have marked in layers, in all by default; return the names of those cleared.

@@ -81,13 +81,16 @@ class DwaController(PathFollower):
         rollouts = roll_out(cycle, velocities, p.sim_step, p.max_vel_x * p.sim_time)
         costs = score(p.critics, rollouts)
         around = MovingAround.on(self.navigation_map, cycle.request.pose, self.clock.now(), p.moving_objects)
-        costs += around.meet(rollouts.poses, p.sim_step).costs
+        met = around.meet(rollouts.poses, p.sim_step)
+        hindered_by = around.hindering(met, costs)
+        costs += met.costs
         checked_steps = round(p.footprint_check_time / cycle.limit_factor / p.sim_step)
         for sample in np.argsort(costs, kind="stable").tolist():
             if costs[sample] >= COLLISION:
                 break
             if is_free(cycle, rollouts.poses[:, :checked_steps, sample]):
-                return ControlResult(ExePathOutcome.SUCCESS, "", Twist.planar(*candidates[sample].tolist()))
+                command = Twist.planar(*candidates[sample].tolist())
+                return ControlResult(ExePathOutcome.SUCCESS, "", command, hindered_by)
         text = f"all {len(candidates)} reachable velocities lead into an obstacle within {p.sim_time:g} s"
         return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
 

@@ -102,7 +102,7 @@ class MppiController(PathFollower):
         self._velocities = np.empty(shape[1:], dtype=np.float32)
         self._poses = np.empty(shape[1:], dtype=np.float32)
         self._smoothing = smoothing_matrix(p.time_steps)
-        self._idle_cycles, self._meets_somebody = 0, False
+        self._idle_cycles, self._hindered_by = 0, ""
         self._nominal: Float32Array = np.zeros((3, p.time_steps), dtype=np.float32)
         self.parameters_changed()
 
@@ -157,7 +157,7 @@ class MppiController(PathFollower):
             if controls is not None:
                 command = controls[:, 0].copy()
                 self._nominal = np.column_stack([controls[:, 1:], controls[:, -1]])
-                return ControlResult(ExePathOutcome.SUCCESS, "", self._command(command))
+                return ControlResult(ExePathOutcome.SUCCESS, "", self._command(command), self._hindered_by)
             if attempt == 0:
                 self._nominal[:] = 0.0  # start over from standing still: the old sequence may be what collides
         text = f"none of {self.parameters.batch_size} sampled trajectories is free of collision"
@@ -168,7 +168,7 @@ class MppiController(PathFollower):
 
         One that lets somebody by is not stuck.
         """
-        idle = self._radius > 0.0 and abs(controls[0, 0]) < STANDSTILL and not self._meets_somebody
+        idle = self._radius > 0.0 and abs(controls[0, 0]) < STANDSTILL and not self._hindered_by
         self._idle_cycles = self._idle_cycles + 1 if idle else 0
         return self._idle_cycles > IDLE_CYCLES
 
@@ -191,7 +191,7 @@ class MppiController(PathFollower):
             return None
         around = MovingAround.on(self.navigation_map, cycle.request.pose, self.clock.now(), p.moving_objects)
         met = around.meet(rollouts.poses, p.model_dt)
-        self._meets_somebody = bool(met.touches.any())
+        self._hindered_by = around.hindering(met, costs)
         costs += met.costs
         controls = blend(velocities, costs + self._control_cost(velocities), p.temperature, self._smoothing)[:, :, None]
         self._clip(cycle, controls)
@@ -199,11 +199,15 @@ class MppiController(PathFollower):
         trajectory = np.empty_like(controls)
         integrate(controls, cycle.request.pose.yaw, p.model_dt, trajectory)
         # The mean of passing in front of somebody and passing behind them may lead into them.
-        best_touches = bool(met.touches[int(np.argmin(costs))])
+        touches = met.touches
+        best_touches = bool(touches[int(np.argmin(costs))])
         is_spoiled = not best_touches and bool(around.meet(trajectory, p.model_dt).touches[0])
         if not is_spoiled and is_free(cycle, trajectory[:, :checked_steps, 0]):
             return np.asarray(controls[:, :, 0])
-        for sample in np.argsort(costs, kind="stable")[:FALLBACK_SAMPLES].tolist():
+        ranked = np.argsort(costs, kind="stable")[:FALLBACK_SAMPLES]
+        if not best_touches:  # those that lead into somebody come last
+            ranked = ranked[np.argsort(touches[ranked], kind="stable")]
+        for sample in ranked.tolist():
             if costs[sample] < COLLISION and is_free(cycle, rollouts.poses[:, :checked_steps, sample]):
                 return np.ascontiguousarray(velocities[:, :, sample])
         return None

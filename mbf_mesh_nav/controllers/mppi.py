@@ -22,7 +22,7 @@ import numpy as np
 from mbf_abstract.execution.path_tracker import reverse_segments
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import exp, norm, tan
-from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
+from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, Encounters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
@@ -98,6 +98,7 @@ class MPPIController(MeshController):
     parameters: MPPIParameters
 
     _approach: GoalApproach | None = None
+    _hindered_by = ""
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
@@ -183,7 +184,8 @@ class MPPIController(MeshController):
         if motion is None:
             return ControlResult(ExePathOutcome.NO_VALID_CMD, "no sampled motion is collision-free and makes progress")
         self._nominal = np.concatenate([motion[1:], motion[-1:]])
-        return ControlResult(ExePathOutcome.SUCCESS, "", self._as_command(float(motion[0, 0]), float(motion[0, 1])))
+        command = self._as_command(float(motion[0, 0]), float(motion[0, 1]))
+        return ControlResult(ExePathOutcome.SUCCESS, "", command, self._hindered_by)
 
     def planned_motion(self) -> PlannedMotion | None:
         """Return the last motion, without its first step."""
@@ -209,20 +211,25 @@ class MPPIController(MeshController):
         to_end = float(norm(end - spot.point))
         controls = self._sample(max_speed, max(self._tracker.to_cusp, to_end))
         around = MovingAround.on(self.mesh_map, pose, self.clock.now(), self.parameters.moving_objects)
-        scores, collided, touches = self._score(controls, spot, pose, around)
+        scores, collided, met = self._score(controls, spot, pose, around)
         scores = np.where(collided, scores + _COLLISION_SCORE, scores)
+        self._hindered_by = around.hindering(met, scores)
+        scores = scores + met.costs
         weights = exp(-(scores - scores.min()) / self.parameters.temperature)
         blended = np.asarray(((weights / weights.sum())[:, None, None] * controls).sum(axis=0))
         # The mean of two free motions, left and right of an obstacle or of somebody, may hit it.
         best = int(np.argmin(scores))
-        _, hits, meets = self._score(blended[None], spot, pose, around)
-        if hits[0] or (meets[0] and not touches[best]):
+        _, hits, mean_met = self._score(blended[None], spot, pose, around)
+        if hits[0] or (mean_met.touches[0] and not met.touches[best]):
             blended = np.asarray(controls[best])
         # Where most motions collide and the best one hardly moves, standing there would last for ever. So it would
         # where none leads nearer, as for a car that has passed its goal; a cycle or two of it are chance. A robot that
         # lets somebody by only waits.
         travel, turn = np.abs(blended.sum(axis=0)) * self.parameters.model_dt
-        stands = travel < _STANDSTILL and turn < _STANDSTILL and not touches.any()
+        stands = travel < _STANDSTILL and turn < _STANDSTILL
+        if stands and not self._hindered_by:  # motions into somebody collide with the ground marked below them
+            self._hindered_by = around.hindering(met, np.where(met.touches, scores, np.inf))
+        stands = stands and not self._hindered_by
         has_far_to_go = self._distance_to_goal(pose) > _STANDSTILL + self.parameters.goal_distance
         self._idle_cycles = self._idle_cycles + 1 if stands and has_far_to_go else 0
         stuck = stands and (collided.mean() > 0.5 or self._idle_cycles > _IDLE_CYCLES)
@@ -259,8 +266,8 @@ class MPPIController(MeshController):
 
     def _score(
         self, controls: FloatArray, spot: SurfacePoint, pose: Pose, around: MovingAround
-    ) -> tuple[FloatArray, BoolArray, BoolArray]:
-        """Scores (n,), collisions (n,) on the map of now, and contacts (n,) with what moves, of motions."""
+    ) -> tuple[FloatArray, BoolArray, Encounters]:
+        """Scores (n,) of motions, collisions (n,) on the map of now, and what moves that they meet."""
         p, mesh_map = self.parameters, self.mesh_map
         snapshot = mesh_map.snapshot()
         pieces = self._pieces_of_a_step()
@@ -306,8 +313,7 @@ class MPPIController(MeshController):
             -1.0 if backward else 1.0,
             poses,
         )
-        costs, touches = around.meet(poses, p.model_dt / pieces)
-        return scores + costs, collided, touches
+        return scores, collided, around.meet(poses, p.model_dt / pieces)
 
     def _run_out(self, end: float) -> FloatArray:
         """Points (3, 3) straight on beyond ``end`` [m] of the path: beyond a cusp, or beyond the goal as it looks."""

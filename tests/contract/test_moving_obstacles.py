@@ -109,6 +109,17 @@ def test_what_looks_ahead_is_compiled_before_the_robot_drives(backends, monkeypa
         assert fresh.signatures == compiled
 
 
+@pytest.mark.parametrize(("backend", "controller"), SAMPLING)
+def test_a_controller_that_lets_somebody_by_waits_no_longer_than_it_may(backends, backend, controller):
+    """With the guard off only the controller waits."""
+    with site(partial(backends[backend], controller=controller), **PARAMETERS) as made:
+        made.server.set_parameters(controller_max_retries=0)
+        walker, result = drive(made, *SAMPLING[backend, controller], stop_before_contact=False, max_wait=0.1)
+        assert result.outcome == ExePathOutcome.BLOCKED_PATH
+        assert re.fullmatch(r"object \d+ moves in the way, at .*; waited 0.\d s for it", result.message)
+        assert walker.touched_by == ""
+
+
 def test_without_the_guard_it_drives_into_them(make_map_server):
     with site(make_map_server, **PARAMETERS) as made:
         walker, _ = drive(made, *CROSSINGS[made.server.backend], stop_before_contact=False)

@@ -9,22 +9,28 @@ whoever comes, and one that gets out of the way is not either.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.maps.navigation_map import NavigationMap
-from mbf_abstract.maps.tracking.contact import moving_on_storey
-from mbf_abstract.maps.tracking.kernels.meeting import OBJECT_COLUMNS, meet
+from mbf_abstract.maps.tracking.contact import in_the_way, moving_on_storey
+from mbf_abstract.maps.tracking.kernels.meeting import NOBODY, OBJECT_COLUMNS, meet
+from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.parameters import ParameterModel, parameter
 
 Float32Array = NDArray[np.float32]
 
 LOOK = 0.1
-"""Time [s] between two looks at robot and objects, or one step of the motions if that is longer."""
+"""Time [s] between two looks at robot and objects, or one step of the motions if that is longer.
+
+With steps of half a second who crosses at 1.5 m/s moves by 0.75 m between two looks, and may pass a motion unseen. Only
+the guard of ``contact.py`` sees it then.
+"""
 
 
 class AvoidanceParameters(ParameterModel):
@@ -40,10 +46,22 @@ class AvoidanceParameters(ParameterModel):
 
 
 class Encounters(NamedTuple):
-    """What motions (n,) cost, float32, and whether each leads into somebody who would not touch a robot that stays."""
+    """What motions (n,) meet.
+
+    Attributes
+    ----------
+    costs : (n,) float32
+    touched : (n,) int32
+        Whom each leads into first who would not touch a robot that stays, among ``MovingAround.moving``, or NOBODY.
+    """
 
     costs: Float32Array
-    touches: NDArray[np.bool_]
+    touched: NDArray[np.int32]
+
+    @property
+    def touches(self) -> NDArray[np.bool_]:
+        """Whether each motion (n,) leads into somebody."""
+        return np.asarray(self.touched != NOBODY)
 
 
 @dataclass(frozen=True)
@@ -52,6 +70,7 @@ class MovingAround:
 
     Attributes
     ----------
+    moving : sequence of TrackedObject
     objects : (k, 5) float32
         Place [m] relative to the robot, velocity [m/s] and radius [m] of each, along the axes of the map.
     yaw : float
@@ -61,6 +80,7 @@ class MovingAround:
     limits : AvoidanceParameters
     """
 
+    moving: Sequence[TrackedObject]
     objects: Float32Array
     yaw: float
     box: Float32Array
@@ -83,7 +103,7 @@ class MovingAround:
         moving = moving_on_storey(known, pose.z)
         rows = [(one.x - pose.x, one.y - pose.y, one.vx, one.vy, one.radius) for one in moving]
         objects = np.array(rows, dtype=np.float32).reshape(-1, OBJECT_COLUMNS)
-        return cls(objects, pose.yaw, np.array(navigation_map.robot_box, dtype=np.float32), limits)
+        return cls(moving, objects, pose.yaw, np.array(navigation_map.robot_box, dtype=np.float32), limits)
 
     @property
     def anybody(self) -> bool:
@@ -105,5 +125,18 @@ class MovingAround:
         """
         p = self.limits
         stride = max(1, round(LOOK / step_time))
-        costs, touches = meet(poses, self.yaw, step_time, stride, self.box, self.objects, p.horizon, p.margin)
-        return Encounters(np.float32(p.weight) * costs, touches)
+        costs, touched = meet(poses, self.yaw, step_time, stride, self.box, self.objects, p.horizon, p.margin)
+        return Encounters(np.float32(p.weight) * costs, touched)
+
+    def hindering(self, met: Encounters, costs: FloatArray | Float32Array) -> str:
+        """Whom the robot would drive into if it did not look ahead; empty if nobody.
+
+        Parameters
+        ----------
+        met : Encounters
+            Of its motions.
+        costs : (n,) float
+            Of these motions, without those of ``met``.
+        """
+        touched = int(met.touched[int(np.argmin(costs))])
+        return "" if touched == NOBODY else in_the_way(self.moving[touched])

@@ -84,6 +84,11 @@ def moving_on_storey(objects: Iterable[TrackedObject], z: float) -> list[Tracked
     return [known for known in objects if known.motion is Motion.MOVING and abs(known.z - z) < SAME_STOREY]
 
 
+def in_the_way(known: TrackedObject) -> str:
+    """Text on an object that the robot waits for."""
+    return f"object {known.number} moves in the way, at ({known.x:.2f}, {known.y:.2f})"
+
+
 def safe_share(
     box: RobotBox,
     pose: Pose,

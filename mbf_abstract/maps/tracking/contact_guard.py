@@ -4,8 +4,9 @@ When to use: by the server of a map, after each answer of a controller; on maps 
 drive around, which planners do by the costs of predicted places, and sampling controllers by looking ahead in time
 (``avoidance.py``).
 
-A robot that waits follows a command of zero, so its controller has not failed. After ``max_wait`` the path counts as
-blocked, and the executive decides.
+A robot that waits follows a command of zero, so its controller has not failed. A controller that looks ahead waits by
+itself and says for whom (``hindered_by``). After ``max_wait`` of either the path counts as blocked, and the executive
+decides.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from mbf_abstract.plugins import ControlResult
 
 CONTINUED = 1.0
 """A robot that was not asked to wait for this long [s] begins to wait anew."""
+STANDSTILL = 0.05
+"""A robot that is hindered and whose command is slower than this [m/s] waits."""
 
 
 class ContactGuard:
@@ -51,15 +54,18 @@ class ContactGuard:
             return answer
         motion = Twist.planar(command.speed) if isinstance(command, AckermannCommand) else command
         share, reason, max_wait = navigation_map.safe_share(pose, velocity, motion, now)
+        safe = answer if share == 1.0 else replace(answer, command=_slower(command, share), message=reason)
         if share > 0.0:
-            return answer if share == 1.0 else replace(answer, command=_slower(command, share), message=reason)
+            if not answer.hindered_by or share * abs(command.speed) >= STANDSTILL:
+                return safe
+            reason, max_wait = answer.hindered_by, navigation_map.max_wait
         if now - self._last > CONTINUED:
             self._waiting_since = now
         self._last = now
         waited = now - self._waiting_since
         if waited > max_wait:
             return ControlResult(ExePathOutcome.BLOCKED_PATH, f"{reason}; waited {waited:.1f} s for it")
-        return replace(answer, command=_slower(command, 0.0), message=reason)
+        return replace(safe, message=reason)
 
 
 def _slower(command: Command, share: float) -> Command:

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.tracking.avoidance import LOOK, AvoidanceParameters, MovingAround
 from mbf_abstract.maps.tracking.contact import RobotBox
+from mbf_abstract.maps.tracking.kernels.meeting import NOBODY
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 
 DISC, CARRIER = RobotBox.disc(0.3), RobotBox(-0.35, 0.45, -0.25, 0.2, 0.05)
@@ -52,12 +53,12 @@ def arc(v, w=0.0, pose=(0.0, 0.0, 0.0), steps=50, step=STEP):
 
 def naive(motion, objects, box, pose, limits, step):
     """Cost and contact of one motion, look by look."""
-    worst, touches = 0.0, False
+    worst, touched = 0.0, NOBODY
     stride = max(1, round(LOOK / step))
     for t in range(stride - 1, len(motion), stride):
         time = (t + 1) * step
-        for known in objects:
-            if time >= limits.horizon or known.motion is not Motion.MOVING:
+        for k, known in enumerate(known for known in objects if known.motion is Motion.MOVING):
+            if time >= limits.horizon:
                 continue
             place = np.array([[known.position_in(time)]])
             there, here = (
@@ -66,8 +67,8 @@ def naive(motion, objects, box, pose, limits, step):
             )
             near, staying = (min(1.0, max(0.0, 1.0 - gap / limits.margin)) for gap in (there, here))
             worst = max(worst, (1.0 - time / limits.horizon) * (near - staying))
-            touches |= there < 0.0 <= here
-    return limits.weight * worst, touches
+            touched = k if touched == NOBODY and there < 0.0 <= here else touched
+    return limits.weight * worst, touched
 
 
 speeds, places = st.floats(-1.0, 1.0), st.floats(-2.0, 2.0)
@@ -81,7 +82,7 @@ people = st.lists(
     people,
     st.lists(st.tuples(speeds, speeds), min_size=1, max_size=5),
     st.floats(-3.0, 3.0),
-    st.sampled_from([0.05, 0.1, 0.2]),
+    st.sampled_from([0.03, 0.05, 0.1, 0.2, 0.5, 1.0]),
 )
 @settings(max_examples=150, deadline=None)
 def test_motions_cost_what_the_naive_twin_finds(objects, velocities, yaw, step):
@@ -92,8 +93,8 @@ def test_motions_cost_what_the_naive_twin_finds(objects, velocities, yaw, step):
         expected = [naive(motion, objects, box, pose, LIMITS, step) for motion in motions]
         assert found.costs == pytest.approx([cost for cost, _ in expected], abs=1e-4)
         near_contact = [min_gap < 1e-5 for min_gap in (_least_gap(m, objects, box, pose, step) for m in motions)]
-        for one, (_, touches), close in zip(found.touches, expected, near_contact, strict=True):
-            assert one == touches or close
+        for one, (_, touched), close in zip(found.touched, expected, near_contact, strict=True):
+            assert one == touched or close
 
 
 def _least_gap(motion, objects, box, pose, step):
@@ -131,6 +132,21 @@ def test_getting_out_of_the_way_of_who_comes_costs_nothing():
     aside, on = met([arc(0.5, -1.5), arc(0.5)], towards)[0]
     back = met([arc(-0.5)], towards).costs[0]
     assert back == 0.0 and on > 5.0 and aside < on
+
+
+def test_whom_the_best_motion_would_meet_first_hinders_the_robot():
+    near, far = replace(person(1.2, 0.0, -0.3), number=4), replace(person(2.0, 0.0, -0.3), number=9)
+    motions = np.array([arc(0.8), arc(0.0)], dtype=np.float32)
+    around = MovingAround.on(Seeing(DISC, far, near), HERE, 0.0, LIMITS)
+    found = around.meet(np.ascontiguousarray(motions.transpose(2, 1, 0)), STEP)
+    assert around.hindering(found, np.array([1.0, 2.0])) == "object 4 moves in the way, at (1.20, 0.00)"
+    assert around.hindering(found, np.array([2.0, 1.0])) == "", "it would stand anyway"
+
+
+def test_who_is_met_after_the_horizon_does_not_count_however_long_the_motion():
+    late, on = person(4.2, 0.0), [arc(1.6, steps=60)]
+    assert not met(on, late, limits=replace_limits(horizon=2.0)).touches.any()
+    assert met(on, late, limits=replace_limits(horizon=3.0)).touches.all()
 
 
 def test_the_sooner_a_contact_the_more_it_costs():

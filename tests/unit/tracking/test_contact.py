@@ -138,14 +138,14 @@ class Answering:
     """A map that answers always alike."""
 
     def __init__(self, share, reason="object 1 moves in the way", max_wait=2.0):
-        self.answer = share, reason, max_wait
+        self.answer, self.max_wait = (share, reason, max_wait), max_wait
 
     def safe_share(self, pose, velocity, command, now):
         return self.answer
 
 
-def judged(guard, share, command, now=0.0, **answer):
-    return guard.judge(Answering(share, **answer), HERE, Twist(), ControlResult(0, "", command), now)
+def judged(guard, share, command, now=0.0, hindered_by="", **answer):
+    return guard.judge(Answering(share, **answer), HERE, Twist(), ControlResult(0, "", command, hindered_by), now)
 
 
 def test_the_guard_slows_down_along_the_same_arc():
@@ -167,6 +167,32 @@ def test_the_guard_waits_and_then_calls_the_path_blocked():
     assert late.outcome == ExePathOutcome.BLOCKED_PATH and "waited 2.1 s for it" in late.message
     again = judged(guard, 0.0, AHEAD, now=10.0)
     assert again.success, "a new wait"
+
+
+@pytest.mark.parametrize("command", [Twist(), Twist.planar(0.02, 0.0, 0.5), AckermannCommand(-0.02, 0.3)])
+def test_a_controller_that_waits_by_itself_is_named_and_bounded_too(command):
+    guard = ContactGuard()
+    for step in range(40):
+        answer = judged(guard, 1.0, command, now=0.05 * step, hindered_by="object 7 moves in the way")
+        assert answer.success and answer.command == command and answer.message == "object 7 moves in the way"
+    late = judged(guard, 1.0, command, now=2.1, hindered_by="object 7 moves in the way")
+    assert late.outcome == ExePathOutcome.BLOCKED_PATH
+    assert late.message == "object 7 moves in the way; waited 2.1 s for it"
+
+
+def test_who_drives_on_or_stands_for_another_reason_does_not_wait():
+    guard = ContactGuard()
+    for step in range(100):
+        drives = judged(guard, 1.0, AHEAD, now=0.05 * step, hindered_by="object 7 moves in the way")
+        assert drives.command == AHEAD and drives.message == ""
+        assert judged(guard, 1.0, Twist(), now=0.05 * step).message == ""
+
+
+def test_waits_of_guard_and_controller_are_one_wait():
+    guard = ContactGuard()
+    for step in range(40):
+        judged(guard, 0.0 if step % 2 else 1.0, Twist.planar(0.03), 0.05 * step, hindered_by="object 7")
+    assert judged(guard, 1.0, Twist(), 2.1, hindered_by="object 7").outcome == ExePathOutcome.BLOCKED_PATH
 
 
 def test_a_wait_goes_on_over_short_moments_of_driving():

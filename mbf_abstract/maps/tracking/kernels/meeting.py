@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from mbf_abstract.maps.tracking.kernels.compiled import kernel
 
 Float32Array = NDArray[np.float32]
-Flags = NDArray[np.bool_]
+Int32Array = NDArray[np.int32]
 
 OBJECT_COLUMNS = 5
 X, Y, VX, VY, RADIUS = range(OBJECT_COLUMNS)
 """Columns of an object: place [m] relative to the robot, velocity [m/s], radius [m]; along the axes of the map."""
+NOBODY = -1
+"""Instead of the row of an object."""
 
 
 @kernel
@@ -28,7 +30,7 @@ def meet(
     objects: Float32Array,
     horizon: float,
     margin: float,
-) -> tuple[Float32Array, Flags]:
+) -> tuple[Float32Array, Int32Array]:
     """What each motion makes worse than a robot that stays where it is: contacts, and less room than the margin.
 
     At each look nearness to an object is 1 in contact and falls to 0 at the margin. A motion costs the most that its
@@ -57,13 +59,14 @@ def meet(
     -------
     costs : (samples,) float32
         From 0 to 1.
-    touches : (samples,) bool
-        Whether the motion leads into an object at a time when the robot that stays is not touched by it.
+    touched : (samples,) int32
+        Row of the first object that the motion leads into at a time when the robot that stays is not touched by it;
+        NOBODY if there is none.
     """
     _, steps, samples = poses.shape
-    costs, touches = np.zeros(samples, dtype=np.float32), np.zeros(samples, dtype=np.bool_)
+    costs, touched = np.zeros(samples, dtype=np.float32), np.full(samples, NOBODY, dtype=np.int32)
     if len(objects) == 0:
-        return costs, touches
+        return costs, touched
     back, front, right, left, radius = box[0], box[1], box[2], box[3], box[4]
     extent = np.sqrt(max(-back, front) ** 2 + max(-right, left) ** 2) + radius + np.float32(margin)
     per_margin, zero, one = np.float32(1.0 / margin), np.float32(0.0), np.float32(1.0)
@@ -108,5 +111,5 @@ def meet(
                 near = one if near > one else near
                 cost = urgency * (near - staying)
                 costs[n] = cost if cost > costs[n] else costs[n]
-                touches[n] |= gap < zero and not is_touched
-    return costs, touches
+                touched[n] = k if touched[n] == NOBODY and gap < zero and not is_touched else touched[n]
+    return costs, touched
