@@ -21,7 +21,7 @@ from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.time.clock import WallClock
 
-FIRST_WORD = 10.0  # s to wait for the base
+FIRST_WORD, GREETING = 10.0, 0.5  # s to wait for the base, and between two greetings until it is heard
 
 
 class UdpRobot:
@@ -29,35 +29,56 @@ class UdpRobot:
 
     def __init__(self, base: tuple[str, int], clock: WallClock, transforms: TransformBuffer) -> None:
         self.heard = threading.Event()
-        self._base, self._clock, self._transforms = base, clock, transforms
+        self._clock, self._transforms = clock, transforms
         self._odometry: Odometry | None = None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.send_command(Twist())  # the base learns where to send to
+        self._socket.connect(base)  # looks its name up, once, and lets nobody else's datagrams in
         threading.Thread(target=self._listen, daemon=True).start()
+
+    def wait_until_heard(self, timeout: float) -> bool:
+        """Greet the base until it answers, at most ``timeout`` [s]; it learns where to send to."""
+        end = self._clock.now() + timeout
+        while not self.heard.is_set() and self._clock.now() < end:
+            try:
+                self.send_command(Twist())
+            except OSError:
+                pass  # it has not booted yet
+            self.heard.wait(GREETING)
+        return self.heard.is_set()
 
     def send_command(self, command: Command) -> None:
         """Send a command to the base; what cannot be sent is the gate's to try again."""
         assert isinstance(command, Twist)
-        self._socket.sendto(json.dumps({"v": command.vx, "w": command.wz}).encode(), self._base)
+        self._socket.send(json.dumps({"v": command.vx, "w": command.wz}).encode())
 
     def odometry(self) -> Odometry | None:
         """Return what came last; the navigator sees by its stamp when nothing comes any more."""
         return self._odometry
 
     def _listen(self) -> None:
+        known = ""
         while True:
-            state, now = json.loads(self._socket.recv(2000)), self._clock.now()
-            pose = Pose.planar(state["x"], state["y"], state["yaw"])
-            self._transforms.set(Transform.from_pose(pose.stamped(now), "base_link"))
-            self._odometry = Odometry(Twist.planar(state["v"], wz=state["w"]), now)
-            self.heard.set()
+            try:
+                self._take(json.loads(self._socket.recv(2000)))
+            except (ValueError, KeyError, TypeError, OSError) as error:  # the next one may be fine
+                if (text := f"{type(error).__name__}: {error}") != known:
+                    print(f"from the base: {text}", file=sys.stderr)
+                    known = text
+
+    def _take(self, state: dict[str, float]) -> None:
+        now = self._clock.now()
+        pose = Pose.planar(state["x"], state["y"], state["yaw"])
+        odometry = Odometry(Twist.planar(state["v"], wz=state["w"]), now)
+        self._transforms.set(Transform.from_pose(pose.stamped(now), "base_link"))
+        self._odometry = odometry
+        self.heard.set()
 
 
 def main(config: str, base: str, x: float, y: float) -> bool:
     host, _, port = base.rpartition(":")
     clock, transforms = WallClock(), TransformBuffer()
     robot = UdpRobot((host, int(port)), clock, transforms)
-    if not robot.heard.wait(FIRST_WORD):
+    if not robot.wait_until_heard(FIRST_WORD):
         print(f"{base} is silent")
         return False
     with Navigator.from_file(config, robot, clock, transforms) as navigator:  # the robot stops at the end of the block

@@ -1,6 +1,7 @@
 """The page "Your robot in ten minutes", its driver, its unit and its container file do what they say."""
 
 import configparser
+import importlib.util
 import json
 import math
 import re
@@ -10,11 +11,14 @@ import subprocess
 import sys
 import threading
 import time
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
 
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
+from mbf_abstract.time.clock import WallClock
 from mbf_ros.messages.nav2_behaviors import BEHAVIORS
 from mbf_ros.ros2 import nav2
 from mbf_ros.rosbridge.navigation import ACTIONS, NODE
@@ -92,6 +96,35 @@ def test_the_driver_takes_a_base_to_its_goal_with_the_configuration_of_the_page(
     assert base.state["v"] == base.state["w"] == 0.0
 
 
+def test_the_driver_survives_rubbish_and_strangers_and_greets_a_base_that_boots_late():
+    spec = importlib.util.spec_from_file_location("udp_driver", ROOT / "examples" / "udp_driver.py")
+    driver = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(driver)
+    clock, transforms = WallClock(), TransformBuffer()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as base:
+        base.bind(("127.0.0.1", 0))
+        robot = driver.UdpRobot(base.getsockname(), clock, transforms)
+        taken, take = [], robot._take
+        robot._take = lambda state: (taken.append(state), take(state))
+        greeting = threading.Thread(target=robot.wait_until_heard, args=(60.0,))
+        greeting.start()
+        greetings = [base.recvfrom(2000) for _ in range(2)]  # the first one is lost
+        address = ("127.0.0.1", greetings[-1][1][1])
+        state = dict.fromkeys(("x", "y", "yaw", "v", "w"), 0.0)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.sendto(json.dumps(state | {"v": 9.0}).encode(), address)
+        for wrong in (b"{", b"[]", b"{}", b"\xff", b'{"x": NaN, "y": 0, "yaw": 0, "v": 0, "w": 0}', b'{"x": "here"}'):
+            base.sendto(wrong, address)
+        base.sendto(json.dumps(state | {"v": 0.5}).encode(), address)
+        greeting.join(60.0)
+
+    assert (
+        robot.heard.is_set()
+        and [state["v"] for state in taken if "v" in state][-1] == 0.5 == robot.odometry().velocity.vx
+    )
+    assert all(state["v"] != 9.0 for state in taken if "v" in state), "a stranger is not listened to"
+
+
 def test_the_unit_can_be_read_by_systemd_and_stops_the_robot_first(tmp_path):
     unit = configparser.ConfigParser(strict=False, interpolation=None)
     unit.optionxform = str
@@ -100,6 +133,8 @@ def test_the_unit_can_be_read_by_systemd_and_stops_the_robot_first(tmp_path):
     service = unit["Service"]
 
     assert (service["KillSignal"], service["Restart"]) == ("SIGTERM", "on-failure")
+    assert unit["Unit"]["StartLimitIntervalSec"] == "0", "it never gives up on a rosbridge that is slow to start"
+    assert f"useradd --system {service['User']}" in text and f"useradd --system {service['User']}" in PAGE
     assert float(service["TimeoutStopSec"]) > 2.0, "goals and the last command need some time"
     assert "bridge connect ws://" in service["ExecStart"] and unit["Install"]["WantedBy"]
     if (tool := shutil.which("systemd-analyze")) is not None:
@@ -119,6 +154,13 @@ def test_the_container_has_the_commands_of_the_readme_and_gets_signals_itself():
 
     assert venv.group(0) in text and "STOPSIGNAL SIGTERM" in text and "USER mbf" in text
     assert command[:3] == ["mbf", "bridge", "connect"]
+    (run,) = re.findall(r"^# (podman run .*)$", text, re.MULTILINE)
+    assert run in PAGE and {"--init", "--restart"} <= set(run.split()) and "--rm" not in run
+    ignored = (DEPLOY / "Containerfile.containerignore").read_text("utf-8").split()
+    packages = re.search(r"^packages = \[(.*?)\]", known, re.MULTILINE | re.DOTALL).group(1)
+    assert "*" in ignored and all(
+        any(fnmatch(name, one[1:]) for one in ignored if one[0] == "!") for name in re.findall(r'"(\w+)"', packages)
+    )
     assert all(f"\n{extra} = [" in known for extra in extras)
     assert " ".join(command) in (DEPLOY / "mbf.service").read_text("utf-8").replace("/opt/mbf/bin/", "")
 
