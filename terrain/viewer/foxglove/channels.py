@@ -72,6 +72,11 @@ class Channels:
         self._state: dict[str, dict[str, Written]] = {topic: {} for topic in TOPICS}
         self._clients: set[FoxgloveClient] = set()
 
+    @property
+    def has_clients(self) -> bool:
+        """Whether anybody could listen; may be asked on any thread."""
+        return bool(self._clients)
+
     @staticmethod
     def advertised() -> list[dict[str, Any]]:
         """All channels with their schemas."""

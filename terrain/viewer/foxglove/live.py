@@ -105,6 +105,11 @@ class LiveServer:
         offer = Offer(SOURCE, extra="foxglove", origin_option="--foxglove-origin", subprotocols=SUBPROTOCOLS)
         self._server = WebSocketServer(self._service, EventBus(self._wall.now, [ServerNotes(note)]), options, offer)
 
+    @property
+    def is_watched(self) -> bool:
+        """Whether a client is connected."""
+        return self._service.is_watched
+
     def start(self, title: str) -> None:
         """Listen, and say where; raises ServerError where nothing can listen there."""
         self._server.start()

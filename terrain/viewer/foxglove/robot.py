@@ -56,6 +56,9 @@ def serve_robot(
     began = 0.0 if isinstance(feed, RunFeed) else feed.began
     server = LiveServer(f"mbf {name}", feed, steering, options.server_options(), note, began)
 
+    if isinstance(feed, RobotFeed):
+        feed.is_watched = lambda: server.is_watched
+
     def look(*_: float) -> None:
         robot.keep_holding()
         server.look()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,13 +20,21 @@ from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import unix_seconds
 from terrain.recording.recorded_maps import RecordedGrid, RecordedMesh, add_if_changed
-from terrain.recording.recorder import MAP_PERIOD, MAX_GRID_CELLS, MAX_MESH_VERTICES, Recorder
+from terrain.recording.recorder import MAP_PERIOD, MAX_GRID_CELLS, Recorder
 from terrain.recording.recording import Recording, RobotShape
 from terrain.viewer.foxglove.feeds import EventQueue
 
 BODY_HEIGHT = 0.3  # m, of a robot of which only the outline is known
 DISC = 0.25  # m, radius of one of which not even that is known
 MAX_PLANS = 100  # that wait for the next part
+MAX_VERTICES = 50_000  # of a mesh; the messages of larger ones would make the controller of the robot wait
+
+
+@runtime_checkable
+class DatedClock(Protocol):
+    """A clock that knows the calendar: ``epoch`` [s since 1970] is when it shows 0."""
+
+    epoch: float
 
 
 class RobotFeed:
@@ -41,12 +51,15 @@ class RobotFeed:
     ----------
     began : float
         Time [s] of the first look.
+    is_watched : callable
+        Whether anybody is there; while nobody is, scans and maps, which cost much, are left out.
     """
 
     def __init__(self, session: NavigationSession, name: str) -> None:
         self._session, self._server, self._name = session, session.navigator.server, name
-        self._epoch = unix_seconds() - session.clock.now()
-        self.began = unix_seconds()
+        self._first_epoch = unix_seconds() - session.clock.now()
+        self.began = session.clock.now() + self._epoch
+        self.is_watched: Callable[[], bool] = lambda: True
         self._shape = RobotShape(name, _outline(self._server), BODY_HEIGHT, np.zeros((0, 3)), 0.0)
         self._events = EventQueue()
         self._scans: dict[str, RangeScan] = {}  # the newest of each sensor
@@ -83,6 +96,12 @@ class RobotFeed:
         part = replace(recorder.finish(events=self._events.take(), began=-self._epoch), grids=grids, meshes=meshes)
         return part if velocity is not None else replace(part, twists=np.full_like(part.twists, np.nan))
 
+    @property
+    def _epoch(self) -> float:
+        """Time [s since 1970] at which the session's clock shows 0; that of ROS time may jump."""
+        clock = self._session.clock
+        return clock.epoch if isinstance(clock, DatedClock) else self._first_epoch
+
     def _velocity(self) -> Twist | None:
         try:
             return self._server.runtime.robot.measured_velocity()
@@ -91,6 +110,8 @@ class RobotFeed:
 
     def _place_scans(self, recorder: Recorder) -> None:
         scans, self._scans = self._scans, {}
+        if not self.is_watched():
+            return
         runtime = self._server.runtime
         for scan in scans.values():
             try:
@@ -101,14 +122,14 @@ class RobotFeed:
 
     def _changed_maps(self, now: float) -> tuple[list[RecordedGrid], list[RecordedMesh]]:
         """The map, if it has changed since it was looked at some seconds ago."""
-        if now < self._next_map:
+        if now < self._next_map or not self.is_watched():
             return [], []
         self._next_map = now + MAP_PERIOD
         view, time = self._server.map_view(), now + self._epoch
         if isinstance(view, GridView) and view.costs.size <= MAX_GRID_CELLS:
             before, self._grid = self._grid, hash((view.extent, view.costs.tobytes()))
             return ([RecordedGrid.of(time, view)] if self._grid != before else []), []
-        if isinstance(view, MeshView) and view.costs.size <= MAX_MESH_VERTICES:
+        if isinstance(view, MeshView) and view.costs.size <= MAX_VERTICES:
             known = len(self._meshes)
             add_if_changed(self._meshes, time, view)
             new = self._meshes[known:]

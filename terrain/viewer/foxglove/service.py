@@ -73,6 +73,11 @@ class FoxgloveService:
             "setParameters": self._set_parameters,
         }
 
+    @property
+    def is_watched(self) -> bool:
+        """Whether a client is connected."""
+        return self._channels.has_clients
+
     # ------------------------------------------------------------------------------------------------ from the robot
     def publish(self, part: Recording) -> None:
         """Send what has happened since the last part."""

@@ -14,11 +14,13 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.view import MeshView
 from mbf_abstract.server.factory import read_config
 from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_abstract.time.clock import WallClock, unix_seconds
+from mbf_abstract.time.sim_clock import SimClock
 from terrain.viewer.foxglove.robot import SteeredRobot
-from terrain.viewer.foxglove.robot_feed import RobotFeed
+from terrain.viewer.foxglove.robot_feed import MAX_VERTICES, RobotFeed
 
 CONFIG = """
 backend: costmap
@@ -179,6 +181,51 @@ def test_a_server_that_is_closed_looks_at_nothing_and_listens_no_more_whatever_i
     assert threading.current_thread() not in parts, "its feed is looked at on one thread only"
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection(("127.0.0.1", served.live.port))
+
+
+def test_times_are_those_of_a_clock_that_knows_the_calendar_even_after_it_was_set(tmp_path):
+    class DatedSimClock(SimClock):
+        epoch = 1000.0
+
+    (tmp_path / "robot.yaml").write_text(CONFIG)
+    with LoopbackSession(Pose.planar(1.0, 1.0), DatedSimClock()) as session:
+        session.serve(*read_config(tmp_path / "robot.yaml"), session.robot, session.transforms)
+        feed = RobotFeed(session, "loopback")
+        session.clock.sleep(0.1)
+        first = feed.part()
+        session.clock.epoch = 5000.0
+        session.events.emit(EventKind.CUSTOM, "test")
+        second = feed.part()
+        feed.close()
+        now = session.clock.now()
+
+    assert 1000.0 <= feed.began <= first.times[0] == pytest.approx(1000.0 + now)
+    assert second.times[0] == second.events[-1].time == pytest.approx(5000.0 + now)
+
+
+def test_while_nobody_is_there_scans_and_maps_are_left_out_and_meshes_that_are_too_large_always(tmp_path, monkeypatch):
+    (tmp_path / "robot.yaml").write_text(CONFIG)
+    with LoopbackSession(Pose.planar(1.0, 1.0)) as session:
+        server = session.serve(*read_config(tmp_path / "robot.yaml"), session.robot, session.transforms)
+        feed = RobotFeed(session, "loopback")
+        session.clock.sleep(0.1)
+        scan = RangeScan.of_rays("eye", np.zeros(3), np.eye(3), [True] * 3, session.clock.now())
+        feed.is_watched = lambda: False
+        feed._take_scan(scan)
+        alone = feed.part()
+        feed.is_watched = lambda: True
+        feed._take_scan(scan)
+        watched = feed.part()
+        meshes = []
+        for count in (MAX_VERTICES, MAX_VERTICES + 1):
+            mesh = MeshView(np.zeros((count, 3)), np.zeros((1, 3), np.int32), np.zeros(count, np.float32))
+            monkeypatch.setattr(server, "map_view", lambda mesh=mesh: mesh)
+            session.clock.sleep(10.0)
+            meshes.append(len(feed.part().meshes))
+        feed.close()
+
+    assert (len(alone.scans), len(alone.grids), len(alone.times)) == (0, 0, 1)
+    assert (len(watched.scans), len(watched.grids)) == (1, 1) and meshes == [1, 0]
 
 
 def test_who_pauses_and_who_resumes_take_turns(robot):
