@@ -1,7 +1,8 @@
 """An environment of Gymnasium: any scenario, driven step by step by whoever learns.
 
 It runs in simulated time alone, in the lockstep clock of ``mbf run``: a step sends one command, and ``control_period``
-seconds pass. The same seed and the same actions give the same bytes, on every CPU.
+seconds pass. An environment is reset and stepped by one thread, as its clock knows the one that has made the world. The
+same seed and the same actions give the same bytes, on every CPU.
 
 Example
 -------
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.parameters import ParameterModel
+from terrain.experiments.evaluation import indoor, outdoor
 from terrain.learning.command_range import CommandRange
 from terrain.learning.episode import Ending, Episode
 from terrain.learning.observation import Observation, ObservationParameters
@@ -56,16 +58,16 @@ class NavigationEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.float32]]):
         What actions mean; all that the robot can do, if not given. The limits of the configuration hold, too.
     reward : RewardWeights or mapping, optional
     control_period : float
-        Length of a step [s]; shorter than ``command_timeout`` of the configuration.
+        Length of a step [s]; at most ``command_timeout`` of the configuration.
     time_limit : float, optional
         Simulated time [s] at which an episode is truncated, instead of the scenario's own.
     seeds : (int, int)
-        First seed, and one past the last one, of the worlds of episodes for which no seed is given.
+        First seed, and one past the last one, of the worlds.
 
     Raises
     ------
     ConfigError
-        The scenario is wrong; all findings.
+        The scenario is wrong; all findings. What its configuration lacks is found by ``reset``.
     ValueError
         Another argument is wrong.
     """
@@ -88,6 +90,8 @@ class NavigationEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.float32]]):
     ) -> None:
         if not control_period > 0.0:
             raise ValueError(f"control_period: expected a time above 0 s, got {control_period}")
+        if time_limit is not None and not time_limit > 0.0:
+            raise ValueError(f"time_limit: expected a time above 0 s, got {time_limit}")
         if not 0 <= seeds[0] < seeds[1]:
             raise ValueError(f"seeds: expected a first one from 0 on, and a later one, got {seeds}")
         self.render_mode = render_mode
@@ -108,11 +112,19 @@ class NavigationEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.float32]]):
     def reset(self, *, seed: int | None = None, options: Values | None = None) -> tuple[Observation, dict[str, Any]]:
         """Build a world, and return the first observation; ``info`` has the seed of the world.
 
-        A seed that is given is the one of the world; else it is drawn from ``seeds``, by the generator of the seed
+        A seed of ``seeds`` is the one of the world, and any other one that is given is counted into ``seeds``, so that
+        no episode is in a world that they leave out. Without one it is drawn from them, by the generator of the seed
         that was given last.
+
+        Raises
+        ------
+        ConfigError, ValueError, RobotStateError
+            As ``Episode``.
         """
         super().reset(seed=seed)
-        chosen = int(self.np_random.integers(*self._seeds)) if seed is None else seed
+        first, end = self._seeds
+        drawn = int(self.np_random.integers(first, end)) if seed is None else seed
+        chosen = drawn if first <= drawn < end else first + drawn % (end - first)
         self.close()
         scenario, of_run = self._worlds(chosen)
         options_of_run = SessionOptions(backend=self._options.backend, seed=of_run, settings=self._options.settings)
@@ -136,13 +148,20 @@ class NavigationEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.float32]]):
             There is no episode, or it is over.
         ValueError
             The action has another shape, or is not finite.
+        BaseException
+            What has made the simulation fail; the episode is over.
         """
         episode = self._episode
         if episode is None or self._ending is not Ending.NOT_YET:
             raise gymnasium.error.ResetNeeded("call reset before the first step, and after an episode's end")
-        gained = episode.drive(self.commands.command(action))
+        command = self.commands.command(action)
+        try:
+            gained = episode.drive(command)
+        except BaseException:
+            self.close()
+            raise
         self._ending = ending = episode.ending(self._limit)
-        asked = np.asarray(action, dtype=np.float64)
+        asked = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
         facts = StepFacts(
             gained=gained,
             arrived=ending is Ending.ARRIVED,
@@ -167,12 +186,12 @@ class NavigationEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.float32]]):
             self._episode = None
 
 
-def of_bench_indoor(levels: Sequence[int] = range(10), **arguments: Any) -> NavigationEnvironment:
+def of_bench_indoor(levels: Sequence[int] = range(indoor.LEVELS), **arguments: Any) -> NavigationEnvironment:
     """Make the environment over the rooms of ``mbf bench indoor``; ``arguments`` are those of the environment."""
     return NavigationEnvironment(bench_indoor(levels), **arguments)
 
 
-def of_bench_outdoor(levels: Sequence[int] = range(10), **arguments: Any) -> NavigationEnvironment:
+def of_bench_outdoor(levels: Sequence[int] = range(outdoor.LEVELS), **arguments: Any) -> NavigationEnvironment:
     """Make the environment over the generated terrains of ``mbf bench outdoor``, likewise."""
     return NavigationEnvironment(bench_outdoor(levels), **arguments)
 

@@ -60,6 +60,8 @@ class Episode:
     ------
     ConfigError
         The configuration is wrong; all findings.
+    RobotStateError
+        The localisation is silent from the start.
     ValueError
         A part of the observation cannot be had in this scenario on this map, or the velocity gate would stop the robot
         before the end of a step.
@@ -90,7 +92,8 @@ class Episode:
         self._goals = session.goals
         self._arrivals: list[Arrival] = []
         self._is_at_last_goal = False
-        self._seen_track, self._max_tilt = 0, 0.0
+        self._max_tilt, self._driven, self._last_sample = 0.0, 0.0, self.true_pose
+        session.loop.on_sample.append(self._take_sample)
         session.run()
         self._known = runtime.robot.pose(), runtime.robot.velocity()
         lease = runtime.gate.acquire(OWNER)
@@ -123,9 +126,6 @@ class Episode:
         session.clock.sleep(self._control_period)
         if session.loop.failure is not None:
             raise session.loop.failure
-        for pose in session.simulation.track[self._seen_track :]:
-            self._max_tilt = max(self._max_tilt, tilt_of(pose))
-        self._seen_track = len(session.simulation.track)
         before, self._way_left = self._way_left, self._measured_way()
         gained = before - self._way_left
         self._take_arrival()
@@ -158,7 +158,7 @@ class Episode:
         self._replan_at = self.session.clock.now() + 1.0 / rate if again else math.inf
         path = self._planned(goal) if self._makes_plans else None
         if path is None and is_new:
-            path = Path.from_points([self.true_pose.position, goal.position], goal.orientation)
+            path = Path.from_points([self._state()[0].position, goal.position], goal.orientation)
         if path is not None:
             self._observer.set_plan(path)
             assert self._observer.tracker is not None
@@ -175,7 +175,7 @@ class Episode:
         return path if refined is None else refined
 
     def _take_arrival(self) -> None:
-        """Go on to the next goal once the robot is at one by its estimated pose, as navigation decides it."""
+        """Go on to the next goal once the plan is driven to its end and the robot is there by its estimated pose."""
         parameters, goal = self._runtime.parameters, self._goals[0]
         pose, _ = self._state()
         if not self._observer.has_arrived(pose, parameters.dist_tolerance, parameters.angle_tolerance):
@@ -210,6 +210,12 @@ class Episode:
         outcome = MoveBaseOutcome.SUCCESS if arrived else MoveBaseOutcome.FAILURE
         return judge(MoveBaseResult(outcome, ending.value), self.session.scenario.limits, self._metrics())
 
+    def _take_sample(self, time: float, pose: Pose, velocity: Twist) -> None:
+        """Tilt and length of a run are those of its recording, so they are taken from its samples."""
+        self._max_tilt = max(self._max_tilt, tilt_of(pose))
+        self._driven += pose.distance_to(self._last_sample)
+        self._last_sample = pose
+
     def _metrics(self) -> Mapping[str, object]:
         """What the judge looks at, as it stands in ``metrics.json`` of a run."""
         simulation, scenario = self.session.simulation, self.session.scenario
@@ -220,6 +226,6 @@ class Episode:
             "incidents": sorted({incident.kind.value for incident in simulation.incidents}),
             "collisions_while_moving": counts[IncidentKind.COLLISION_WHILE_MOVING],
             "tip_overs": counts[IncidentKind.TIPPED_OVER],
-            "max_tilt_deg": math.degrees(self._max_tilt),
-            "path_length_m": simulation.monitor.distance,
+            "max_tilt_deg": round(math.degrees(self._max_tilt), 6),
+            "path_length_m": round(self._driven, 6),
         }

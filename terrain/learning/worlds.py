@@ -31,10 +31,23 @@ def one_world(scenario: Scenario | str) -> Worlds:
 
 
 def bench_indoor(levels: Sequence[int] = range(indoor.LEVELS)) -> Worlds:
-    """Return the rooms of ``mbf bench indoor``: the seed counts through the levels, then through the rooms' seeds."""
+    """Return the rooms of ``mbf bench indoor``: the seed counts through the levels, then through the rooms' seeds.
+
+    Raises
+    ------
+    ValueError
+        There are no levels, or one that the evaluation does not have.
+    """
+    _check(levels, indoor.LEVELS)
     return lambda seed: (indoor.room(levels[seed % len(levels)], seed // len(levels)), seed // len(levels))
 
 
 def bench_outdoor(levels: Sequence[int] = range(outdoor.LEVELS)) -> Worlds:
     """Return the generated terrains of ``mbf bench outdoor``, counted likewise."""
+    _check(levels, outdoor.LEVELS)
     return lambda seed: (outdoor.generated(levels[seed % len(levels)]), seed // len(levels))
+
+
+def _check(levels: Sequence[int], count: int) -> None:
+    if not levels or not all(0 <= level < count for level in levels):
+        raise ValueError(f"levels: expected at least one from 0 to {count - 1}, got {list(levels)}")

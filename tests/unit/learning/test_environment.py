@@ -7,6 +7,8 @@ import pytest
 
 from mbf_abstract.config.findings import ConfigError
 from terrain.experiments.evaluation.outdoor import CONFIGS as OUTDOOR
+from terrain.learning.worlds import bench_indoor, bench_outdoor
+from terrain.recording.metrics import measure
 from terrain.scenarios.faults import SensorFault
 from terrain.scenarios.limits import Limits
 from terrain.scenarios.scenario import PlanarPose
@@ -129,6 +131,8 @@ def test_every_shipped_scenario_with_one_robot_has_an_id():
     ("arguments", "message"),
     [
         ({"control_period": 0.0}, "control_period: expected a time above 0 s, got 0.0"),
+        ({"time_limit": 0.0}, "time_limit: expected a time above 0 s, got 0.0"),
+        ({"time_limit": float("nan")}, "time_limit: expected a time above 0 s, got nan"),
         ({"seeds": (5, 5)}, "seeds: expected a first one from 0 on, and a later one"),
         ({"observation": {"scan_sector": 3}}, "scan_sector"),
         ({"commands": {"max_vel_x": -1.0}}, "max_vel_x"),
@@ -195,6 +199,56 @@ def test_hills_in_bullet_are_driven_on_with_heights_and_without_a_lidar(make_env
         gained += info["reward_parts"]["progress"]
         assert not terminated and not truncated
     assert gained > 0.1 and environment.observation_space.contains(observation)
+
+
+def test_the_judge_gets_the_numbers_of_the_recording_of_a_run(make_environment, small_room):
+    hills = small_room(
+        world=GeneratedWorld(type="generated", size=(7.0, 5.0), spacing=0.25, median_slope=6.0), obstacles=()
+    )
+    environment = make_environment(hills, backend="mesh")
+    environment.reset(seed=0)
+    for turn in (0.0, 0.6, 0.6, -0.6, 0.0, -0.6, 0.4):
+        environment.step([1.0, turn])
+    judged = environment._episode._metrics()
+    recorded = measure(environment._episode.session.recorder.finish()).to_json()
+    assert judged["max_tilt_deg"] > 0.5 and judged["path_length_m"] > 0.1
+    for name in ("max_tilt_deg", "path_length_m"):
+        assert judged[name] == pytest.approx(recorded[name], abs=2e-6)
+
+
+def test_a_seed_that_is_given_is_counted_into_the_seeds(make_environment):
+    environment = make_environment(seeds=(1000, 3000))
+    worlds = [environment.reset(seed=seed)[1]["world_seed"] for seed in (0, 1000, 2999, 3001)]
+    assert worlds == [1000, 1000, 2999, 2001]
+
+
+def test_what_an_action_is_beyond_its_range_costs_no_effort(make_environment):
+    environment = make_environment()
+    environment.reset(seed=0)
+    environment.step([1.0, 0.0])
+    assert environment.step([5.0, 0.0])[4]["reward_parts"]["effort"] == 0.0
+
+
+def test_a_simulation_that_fails_ends_the_episode(make_environment):
+    environment = make_environment()
+    environment.reset(seed=0)
+
+    def fail(time):
+        raise OSError("no physics")
+
+    environment._episode.session.loop.on_tick.append(fail)
+    with pytest.raises(OSError, match="no physics"):
+        environment.step([0.0, 0.0])
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        environment.step([0.0, 0.0])
+    environment.reset(seed=0)
+
+
+@pytest.mark.parametrize("levels", [[], [12], [-1]])
+def test_levels_that_an_evaluation_does_not_have_are_refused(levels):
+    for worlds in (bench_indoor, bench_outdoor):
+        with pytest.raises(ValueError, match="levels: expected at least one from 0 to 9"):
+            worlds(levels)
 
 
 def test_misuse_is_refused(make_environment):
