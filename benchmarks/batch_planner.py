@@ -32,6 +32,7 @@ from mbf_abstract.server.navigation_server import AbstractNavigationServer
 
 Ends = tuple[list[Pose], list[Pose]]
 BAR_ON_TWO = 1.8
+MOST_DRAWS = 10
 PLANNERS = {
     "mesh": ("astar", "dijkstra", "cvp", "any_angle", "heading_astar"),
     "costmap": ("astar", "theta_star", "hybrid_astar"),
@@ -71,14 +72,16 @@ def reachable_pairs(server: AbstractNavigationServer, size: float, count: int) -
     """Random pairs of poses on the ground that the first planner finds a path between."""
     batch = BatchPlanner(server)
     rng, starts, goals = np.random.default_rng(11), [], []
-    while len(starts) < count:
+    for _ in range(MOST_DRAWS):
         drawn = rng.uniform(0.05 * size, 0.95 * size, (2 * count, 2, 2))
         ends = [[server.ground_pose(*place) for place in drawn[:, side]] for side in (0, 1)]
         for start, goal, result in zip(*ends, batch.plan_many(*ends), strict=True):
             if result.success:
                 starts.append(start)
                 goals.append(goal)
-    return starts[:count], goals[:count]
+        if len(starts) >= count:
+            return starts[:count], goals[:count]
+    raise SystemExit(f"only {len(starts)} of {2 * count * MOST_DRAWS} random pairs have a path, {count} are needed")
 
 
 def seconds(batch: BatchPlanner, ends: Ends) -> float:
@@ -116,7 +119,7 @@ def main() -> None:
     arguments.add_argument("--json", action="store_true", help="print the figures as one JSON line at the end")
     arguments.add_argument("--pairs", type=int, default=60)
     arguments.add_argument("--rounds", type=int, default=3)
-    arguments.add_argument("--workers", type=int, default=len(os.sched_getaffinity(0)))
+    arguments.add_argument("--workers", type=int, default=os.cpu_count())
     options = arguments.parse_args()
     side, cells = (300, 400) if options.quick else (526, 1000)
     rows = []

@@ -63,7 +63,8 @@ class Announcer:
             way = np.concatenate([way, self._tracker.ahead(LENGTH)])
             remaining = float(norm(way[1] - way[0])) + self._tracker.remaining
             destination = self._tracker.points[-1]
-        runtime.traffic.announce(Announcement("", now, way, round(remaining, DIGITS)), destination)
+        state = Announcement("", now, way, round(remaining, DIGITS), radius=self._server.robot_radius)
+        runtime.traffic.announce(state, destination)
 
     def _take_path(self, now: float) -> None:
         """Keep up with the newest goal of ``exe_path``; without goals that drive, forget its path after a while."""

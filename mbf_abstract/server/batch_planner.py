@@ -4,7 +4,8 @@ When to use: hundreds of plans on one map. When not: for the next path of one ro
 patience, retries, a fallback planner and events, and none of them is here.
 
 Planners spend their time in kernels that release the interpreter's lock, so threads share one map and copy nothing.
-Each thread has an instance of the planner of its own. A planner written in plain Python gains nothing.
+Each thread has an instance of the planner of its own. A planner written in plain Python gains nothing, nor does one on
+a map of tiles, where one search runs at a time.
 
 Example
 -------
@@ -15,6 +16,7 @@ Example
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import count
@@ -41,7 +43,7 @@ class BatchPlanner:
     planner : str
         Name of a loaded planner, whose parameters are taken over as they are now; the first one if empty.
     workers : int, optional
-        Number of threads; one a processor that this process may use if not given.
+        Number of threads; one a processor if not given.
 
     Raises
     ------
@@ -52,13 +54,14 @@ class BatchPlanner:
     """
 
     def __init__(self, server: AbstractNavigationServer, planner: str = "", workers: int | None = None) -> None:
-        workers = len(os.sched_getaffinity(0)) if workers is None else workers
+        workers = (os.cpu_count() or 1) if workers is None else workers
         if workers < 1:
             raise ValueError(f"at least one worker is needed, got {workers}")
         if problem := server.plugins.problem(PluginKind.PLANNER, planner):
             raise ServerError(problem)
         name = server.plugins.get(PluginKind.PLANNER, planner).name
         self._server = server
+        self._busy = threading.Lock()
         self._planners = [server.further_instance(PluginKind.PLANNER, name) for _ in range(workers)]
 
     def plan_many(
@@ -74,7 +77,7 @@ class BatchPlanner:
 
         The result of a pair is that of one call of the planner, checked as ``get_path`` checks it. It does not depend
         on the number of workers as long as the planner's answers do not depend on what it was asked before, which
-        holds for all that are shipped. What sensors see meanwhile is in the later plans only.
+        holds for all that are shipped for costmaps and meshes. What sensors see meanwhile is in the later plans only.
 
         Parameters
         ----------
@@ -92,6 +95,8 @@ class BatchPlanner:
 
         Raises
         ------
+        ServerError
+            Another thread is in this method.
         ValueError
             Not as many starts as goals, or a tolerance is negative.
         TransformError
@@ -111,7 +116,12 @@ class BatchPlanner:
             )
             for start, goal in zip(starts, goals, strict=True)
         ]
-        return self._plan(requests, token) if requests else []
+        if not self._busy.acquire(blocking=False):
+            raise ServerError("this batch planner is in use by another thread; make one for each")
+        try:
+            return self._plan(requests, token) if requests else []
+        finally:
+            self._busy.release()
 
     def _plan(self, requests: list[PlanRequest], token: CancelToken) -> list[GetPathResult]:
         """Hand the requests out to the threads, one by one."""

@@ -14,6 +14,7 @@ from typing import Any
 
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.scan_intake import ScanIntake
@@ -84,6 +85,11 @@ class MapServer(AbstractNavigationServer):
         served = self._served(name) if name else list(self.served.values())[-1]
         reason: str = served.map.stale_reason(self.runtime.clock.now())
         return reason
+
+    @property
+    def robot_radius(self) -> float:
+        """That of the outline on the map that the robot drives on."""
+        return float(norm(list(self.served.values())[-1].map.robot_outline).max())
 
     def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
         """Slow down, or stop, in time before what moves on the map that the robot drives on."""

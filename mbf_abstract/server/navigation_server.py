@@ -145,6 +145,11 @@ class AbstractNavigationServer(PluginHost):
     """Whether all ground is at height 0, so that a place needs no z."""
 
     @property
+    def robot_radius(self) -> float:
+        """Radius [m] of a circle around the base that holds all of the robot; 0 of a server that does not know."""
+        return 0.0
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """Notes for the user: what was left out of the configuration, and what the map server found."""
         left_out = (

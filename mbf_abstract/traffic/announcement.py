@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +33,8 @@ class Announcement:
         Whether it has looked for a place to let others pass and has found none, or did not get there.
     waits : int
         How often it has waited in vain for others to let it pass, since it has met them.
+    radius : float
+        Of a circle [m] around its place that holds all of the robot; 0 = not known.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Announcement:
     remaining: float
     cannot_yield: bool = False
     waits: int = 0
+    radius: float = 0.0
 
     def to_json(self) -> str:
         """Return it as a JSON object, to be sent; ``from_json`` reads it."""
@@ -61,11 +63,15 @@ class Announcement:
                 float(values["remaining"]),
                 bool(values["cannot_yield"]),
                 int(values["waits"]),
+                float(values["radius"]),
             )
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise ValueError(f"no announcement of a robot: {type(error).__name__}: {error}") from error
-        if not (read.name and len(way) and np.isfinite(way).all() and math.isfinite(read.stamp + read.remaining)):
-            raise ValueError("no announcement of a robot: it needs a name, a place and finite numbers")
+        numbers = np.array([read.stamp, read.remaining, read.radius, *way.ravel()])
+        if not (read.name and len(way) and np.isfinite(numbers).all() and read.radius >= 0.0):
+            raise ValueError(
+                "no announcement of a robot: it needs a name, a place and finite numbers, the radius not below 0"
+            )
         return read
 
     def points_ahead(self, length: float) -> FloatArray:

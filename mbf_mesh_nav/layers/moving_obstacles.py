@@ -35,7 +35,15 @@ from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
-from mbf_mesh_nav.map.layer import NOTHING_CHANGED, CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.map.layer import (
+    NOTHING_CHANGED,
+    CostArray,
+    LayerContext,
+    LayerParameters,
+    LethalArray,
+    MeshLayer,
+    in_square,
+)
 from mbf_mesh_nav.map.layer_graph import union_of
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -130,10 +138,10 @@ class MovingObstaclesLayer(MeshLayer):
         return self._forget(np.ones(self.topology.vertex_count, dtype=np.bool_), None)
 
     def clear_area(self, center: FloatArray, size: float, inside: bool) -> IntArray:
-        """Forget objects and trails inside, or outside, a cube; the map is then stale as after forgetting all."""
+        """Forget objects and trails inside, or outside, a square, see ``in_square``; the map is then stale, too."""
 
         def within(places: FloatArray) -> NDArray[np.bool_]:
-            return np.asarray((np.abs(places - center) <= size / 2.0).all(axis=1) == inside)
+            return np.asarray(in_square(places, center, size, self.parameters.robot_height) == inside)
 
         return self._forget(within(self.topology.vertices), within)
 

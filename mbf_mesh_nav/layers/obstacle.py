@@ -26,7 +26,15 @@ from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
-from mbf_mesh_nav.map.layer import NOTHING_CHANGED, CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.map.layer import (
+    NOTHING_CHANGED,
+    CostArray,
+    LayerContext,
+    LayerParameters,
+    LethalArray,
+    MeshLayer,
+    in_square,
+)
 from mbf_mesh_nav.map.range_image import NO_RANGE, RangeImage
 
 MAX_WAITING = 256
@@ -155,8 +163,8 @@ class ObstacleLayer(MeshLayer):
         return self._keep_only(Hits.none())
 
     def clear_area(self, center: FloatArray, size: float, inside: bool) -> IntArray:
-        """Drop the hits inside, or outside, a cube; the map is then stale as after dropping all."""
-        within = (np.abs(self._hits.points - center) <= size / 2.0).all(axis=1)
+        """Drop the hits inside, or outside, a square (``in_square``); the map is then stale as after dropping all."""
+        within = in_square(self._hits.points, center, size, self.parameters.robot_height)
         return self._keep_only(self._hits.where(within != inside))
 
     def _keep_only(self, hits: Hits) -> IntArray:

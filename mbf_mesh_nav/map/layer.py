@@ -149,8 +149,18 @@ class MeshLayer(map_layer.MapLayer):
         return NOTHING_CHANGED
 
     def clear_area(self, center: FloatArray, size: float, inside: bool) -> IntArray:
-        """Forget what was sensed in, or out of, a cube of edge ``size`` [m] around ``center`` (3,) [m]."""
+        """Forget what was sensed in, or out of, a square of side ``size`` [m] around a place (3,): ``in_square``."""
         return NOTHING_CHANGED
+
+
+def in_square(points: FloatArray, center: FloatArray, size: float, height: float) -> BoolArray:
+    """Which points (n, 3) [m] lie in a square of side ``size`` [m] around a place (3,) on the ground, seen from above.
+
+    They are no farther above or below it than ``height`` [m], or half of the side where that is more: hits of a sensor
+    are up to a robot's height above the ground, and the ground in the square may slope.
+    """
+    reach = np.array([0.5 * size, 0.5 * size, max(0.5 * size, height)])
+    return np.asarray((np.abs(points - center) <= reach).all(axis=1))
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:

@@ -251,7 +251,7 @@ class MeshMap(LayeredMap):
     def clear_area(
         self, center: Pose, size: float, layer_names: Iterable[str] | None = None, *, inside: bool = True
     ) -> list[str]:
-        """Forget obstacles sensed inside, or outside, a cube of edge ``size`` [m] around a pose, as ``clear``."""
+        """Forget obstacles sensed inside, or outside, a square of side ``size`` [m] around a pose, as ``clear``."""
         chosen, middle = self._sensing(layer_names), np.asarray(center.position)
 
         def forget(layer: MeshLayer) -> IntArray:

@@ -117,9 +117,9 @@ def world(request):
         block = {"sources": {"scan": source}} if costmap else {"sources": ["scan"], **source}
         return make(lambda x, y: x < -1.0, obstacle=block, inflation={"inflation_radius": 0.8})
 
-    def see(navigation_map, *places, stamp=0.0):
+    def see(navigation_map, *places, stamp=0.0, height=0.3):
         """Let the sensor see something at places (x, y) [m], and the map take it in."""
-        navigation_map.insert_points("scan", [(x, y, 0.3) for x, y in places], (3.0, 3.0, 0.3), stamp)
+        navigation_map.insert_points("scan", [(x, y, height) for x, y in places], (3.0, 3.0, height), stamp)
         navigation_map.update(Pose.planar(3.0, 3.0), stamp)
 
     def cost_at(navigation_map, x, y):

@@ -177,6 +177,18 @@ def test_two_pairs_are_planned_at_the_same_time():
     assert all(result.success for result in results)
 
 
+def test_a_second_thread_is_refused():
+    batches = []
+
+    def asks_again(request):
+        batches[0].plan_many([HERE], [AWAY])
+
+    with ScriptedSession({"planner": played(asks_again)}) as session:
+        batches.append(BatchPlanner(session.server))
+        (result,) = batches[0].plan_many([HERE], [AWAY])
+    assert "raised ServerError in make_plan: this batch planner is in use by another thread" in result.message
+
+
 def test_no_pairs_give_no_plans(session):
     assert BatchPlanner(session.server).plan_many([], []) == []
 

@@ -5,13 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
+from mbf_abstract.commands.standing_server import read_config_text, standing_server
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.pull_out import find_pull_out, way_in_plane
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.maps.recoveries.give_way import GiveWayParameters, GiveWayRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
+from mbf_abstract.server.announcer import Announcer
 from mbf_abstract.testing.contract.recovery import RigMotion
 from mbf_abstract.testing.contract.rig import rig
 from mbf_abstract.time.cancel import CancelToken
@@ -20,6 +23,7 @@ from mbf_abstract.traffic.right_of_way import in_each_others_way, right_of_way
 from mbf_abstract.traffic.traffic import SharedChannel, Traffic
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 RADIUS = 0.2  # m, of the robot
 START = Pose.planar(4.5, 3.0)
@@ -219,7 +223,7 @@ def test_it_follows_the_surface_where_the_way_is_not_along_x(give_way):
 def announced(name, x_from, x_to, remaining):
     """A robot that goes along the corridor."""
     x = np.linspace(x_from, x_to, 20)
-    return Announcement(name, 0.0, np.column_stack([x, np.full(20, 3.0), np.zeros(20)]), remaining)
+    return Announcement(name, 0.0, np.column_stack([x, np.full(20, 3.0), np.zeros(20)]), remaining, radius=0.3)
 
 
 class Radio(SharedChannel):
@@ -401,13 +405,13 @@ class PullingOut(Radio):
 def test_the_maps_forget_where_robots_met_that_have_left(give_way, world, channel, parked_at, is_forgotten):
     """No ray passes the cells on which one was seen: nothing is sensed anew. What stands beside it is kept."""
     seen = world.sensing()
-    world.see(seen, (5.3, 3.0), (5.2, 3.9))
+    world.see(seen, (5.25, 3.0), (5.1, 3.35), height=0.7)
     traffic = head_on(9.0, channel(until=100.0))
-    traffic._channel.publish(Announcement("carl", 0.0, np.array([[parked_at, 3.0, 0.0]]), 0.0))
+    traffic._channel.publish(Announcement("carl", 0.0, np.array([[parked_at, 3.0, 0.0]]), 0.0, radius=0.3))
     result, _ = give_way(hall, traffic=traffic, navigation_map=seen, longest_wait=4.0)
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
-    assert math.isfinite(world.cost_at(seen, 5.3, 3.0)) == is_forgotten
-    assert math.isinf(world.cost_at(seen, 5.2, 3.9))
+    assert math.isfinite(world.cost_at(seen, 5.25, 3.0)) == is_forgotten
+    assert math.isinf(world.cost_at(seen, 5.1, 3.35))
 
 
 def test_a_drive_that_somebody_stops_goes_on_once_they_are_gone(give_way, world):
@@ -427,3 +431,23 @@ def test_a_drive_that_somebody_stops_goes_on_once_they_are_gone(give_way, world)
     assert stops
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
     assert abs(motion.end.y - 3.0) > 0.5
+
+
+CORNERS = "[[0.4, 0.3], [0.4, -0.3], [-0.3, -0.3], [-0.3, 0.3]]"
+COSTMAP = f"{{width: 4.0, height: 4.0, footprint_padding: 0.0, footprint: '{CORNERS}'}}"
+OUTLINES = {
+    "costmap": (f"global_costmap: {COSTMAP}\nlocal_costmap: {COSTMAP}", 0.5),
+    "mesh": ("mesh_map: {mesh_file: MESH, inscribed_radius: 0.35, layers: []}", 0.35),
+}
+
+
+@pytest.mark.parametrize("backend", OUTLINES)
+def test_a_robot_announces_how_large_it_is(backend, tmp_path):
+    text, radius = OUTLINES[backend]
+    trimesh.Trimesh(*heightfield_mesh(np.zeros((9, 9)), 0.5, 0.5), process=False).export(tmp_path / "floor.ply")
+    text = f"backend: {backend}\nplanners: []\ncontrollers: []\n{text}".replace("MESH", str(tmp_path / "floor.ply"))
+    cls, config = read_config_text(text)
+    channel = SharedChannel()
+    with standing_server(cls, config) as server:
+        Announcer(server, "anna", channel).announce()
+    assert channel.latest()[0].radius == pytest.approx(radius, rel=0.01)

@@ -23,15 +23,17 @@ The server's ``recovery_patience`` must leave time for drive and wait.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import groupby
 from typing import ClassVar
 
 import numpy as np
 
+from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.geometry import FloatArray, Path, Pose, Twist, normalize_angle
+from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import Transform
@@ -90,9 +92,9 @@ class GiveWayRecovery(GuardedRecovery):
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Pull out and wait, or wait first, where the right of way is this robot's; then forget where others stood."""
         rivals = self._rivals()
-        stood = {rival.name: rival.way[0] for rival in rivals}
         result = self._yield_or_wait(request, rivals)
-        self._forget_left_places(request.motion.pose(), stood)
+        with suppress(RobotStateError):  # what was done is done; whoever drives next needs the pose as well
+            self._forget_left_places(request.motion.pose(), rivals)
         return result
 
     def _yield_or_wait(self, request: RecoveryRequest, rivals: Sequence[Announcement]) -> RecoveryResult:
@@ -122,7 +124,11 @@ class GiveWayRecovery(GuardedRecovery):
         """Search a place and drive there section by section; search anew where the way there is not free."""
         p, token = self.parameters, request.cancel_token
         result = RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
-        for _ in range(ATTEMPTS):
+        for attempt in range(ATTEMPTS):
+            if attempt:
+                paused = stand(request, PAUSE)  # somebody who moves there stops before this robot, or passes
+                if not paused.success:
+                    return paused
             begin = request.motion.pose()
             steps = self._manoeuvre(begin, request)
             if token.cancelled:
@@ -134,9 +140,6 @@ class GiveWayRecovery(GuardedRecovery):
             result = self._drive_along(begin, steps, request)
             if result.outcome != RecoveryOutcome.IMPASSABLE:
                 break
-            paused = stand(request, PAUSE)  # somebody who moves there stops before this robot, or passes
-            if not paused.success:
-                return paused
         return result
 
     def _stand_aside(self, request: RecoveryRequest, before: list[Announcement]) -> RecoveryResult:
@@ -198,15 +201,17 @@ class GiveWayRecovery(GuardedRecovery):
         result = self._wait_for(request, before, f"{failed.message}; asks for the right of way over")
         return replace(result, outcome=failed.outcome) if result.success and self._rivals() else result
 
-    def _forget_left_places(self, pose: Pose, stood: Mapping[str, FloatArray]) -> None:
-        """Free what the maps keep of places (3,) [m] that these robots have left: no ray passes all of its cells."""
+    def _forget_left_places(self, pose: Pose, rivals: Sequence[Announcement]) -> None:
+        """Free what the maps keep of the bodies of robots that have left: no ray passes all of these cells."""
         now, size = self.clock.now(), self.parameters.distance
         present = {other.name: other.way[0] for other in self.traffic.others(now)}
-        known = [stood[name] for name in stood if name in present]
-        left = [place for place in known if all(norm(there - place) > size for there in present.values())]
+        known = [rival for rival in rivals if rival.name in present and rival.radius > 0.0]
+        left = [one for one in known if all(norm(there - one.way[0]) > size for there in present.values())]
         for one in (self.maps.values() or [self.navigation_map]) if left else ():
-            for x, y, z in np.array(left).tolist():
-                one.clear_area(self.on_map(Pose.planar(x, y, z=z, frame_id=pose.frame_id), one), size)
+            for rival in left:
+                x, y, z = rival.way[0].tolist()
+                place = Pose.planar(x, y, z=z, frame_id=pose.frame_id)
+                one.clear_area(self.on_map(place, one), 2.0 * rival.radius)
             one.update(self.on_map(pose, one), now)
 
     # -------------------------------------------------------------------------------------------------- the search

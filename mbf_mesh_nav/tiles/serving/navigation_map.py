@@ -264,7 +264,7 @@ class TiledNavigationMap(LayeredMap):
     def clear_area(
         self, center: Pose, size: float, layer_names: Iterable[str] | None = None, *, inside: bool = True
     ) -> list[str]:
-        """Forget obstacles sensed inside, or outside, a cube of edge ``size`` [m] around a pose, as ``clear``."""
+        """Forget obstacles sensed inside, or outside, a square of side ``size`` [m] around a pose, as ``clear``."""
         if self._window is None:
             return []
         return self._window.cleared(lambda one: one.clear_area(center, size, layer_names, inside=inside))
