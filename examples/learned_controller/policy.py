@@ -8,7 +8,9 @@ robot's axis turns it the other way at the same speed, which halves the numbers 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,7 @@ OBSERVED = ObservationParameters(scan_sectors=24, scan_range=2.0, waypoints=4, w
 COMMANDS = CommandRange(max_vel_x=0.5, min_vel_x=-0.5, max_vel_theta=1.57)
 SPEED_WEIGHTS, TURN_WEIGHTS = 22, 17
 SIZE = SPEED_WEIGHTS + TURN_WEIGHTS
+WEIGHTS = Path(__file__).with_name("weights.json")
 
 
 def start() -> NDArray[np.float64]:
@@ -30,6 +33,11 @@ def start() -> NDArray[np.float64]:
     weights[0], weights[6] = 0.8, -1.0
     weights[SPEED_WEIGHTS + 1] = 2.0
     return weights
+
+
+def read_weights() -> list[float]:
+    """Return the weights (39,) beside this file, which ``train.py`` has written."""
+    return [float(weight) for weight in json.loads(WEIGHTS.read_text())]
 
 
 def features(seen: Observation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -61,9 +69,7 @@ class LearnedController(PolicyController):
 
     def __init__(self, context: Any) -> None:
         super().__init__(context)
-        from weights import WEIGHTS  # of this folder; train.py writes it
-
-        self._weights = WEIGHTS
+        self._weights = read_weights()
 
     def act(self, observation: Observation) -> list[float]:
         """Return the action of the policy."""

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 FOLDER = Path(__file__).resolve().parents[3] / "examples" / "learned_controller"
-MODULES = ("policy", "train", "weights")
+MODULES = ("policy", "train")
 
 
 @pytest.fixture(scope="module")
@@ -20,9 +20,8 @@ def example():
     try:
         import policy
         import train
-        import weights
 
-        yield policy, train, weights
+        yield policy, train
     finally:
         sys.path.remove(str(FOLDER))
         for name in MODULES:
@@ -36,7 +35,7 @@ plans = st.lists(st.tuples(values, values), min_size=4, max_size=4)
 
 @given(scan=scans, plan=plans, speed=values, turning=values, seed=st.integers(0, 99))
 def test_a_mirrored_world_gives_the_mirrored_command(example, scan, plan, speed, turning, seed):
-    policy, _, _ = example
+    policy, _ = example
     weights = np.random.default_rng(seed).normal(size=policy.SIZE)
     mirrored_plan = np.array(plan) * [1.0, -1.0]
     ahead, turn = policy.action(
@@ -47,9 +46,10 @@ def test_a_mirrored_world_gives_the_mirrored_command(example, scan, plan, speed,
 
 
 def test_a_training_that_was_stopped_ends_with_the_same_numbers(example, tmp_path, monkeypatch):
-    _, train, _ = example
+    policy, train = example
     monkeypatch.setattr(train, "STATE", tmp_path / "training.json")
-    monkeypatch.setattr(train, "WEIGHTS", tmp_path / "weights.py")
+    for module in (policy, train):
+        monkeypatch.setattr(module, "WEIGHTS", tmp_path / "weights.json")
 
     def drive_all(jobs):
         return [float(-np.square(weights - 0.3).sum() - room % 7) for weights, room in jobs]
@@ -63,15 +63,16 @@ def test_a_training_that_was_stopped_ends_with_the_same_numbers(example, tmp_pat
     done, stopped, _ = train.read_state()
     assert done == 4 and stopped.tolist() == mean.tolist()
     assert np.square(mean - 0.3).sum() < np.square(train.start() - 0.3).sum()
-    assert str(mean[0]) in (tmp_path / "weights.py").read_text()
+    assert policy.read_weights() == mean.tolist()
 
 
 def test_the_shipped_weights_drive_through_a_room_that_they_were_not_trained_in(example, drive):
-    policy, train, weights = example
-    assert len(weights.WEIGHTS) == policy.SIZE
+    policy, train = example
+    weights = policy.read_weights()
+    assert len(weights) == policy.SIZE
     environment = train.of_bench_indoor([0], observation=policy.OBSERVED, commands=policy.COMMANDS)
     try:
-        _, steps = drive(environment, lambda seen: policy.action(weights.WEIGHTS, seen), seed=0)
+        _, steps = drive(environment, lambda seen: policy.action(weights, seen), seed=0)
         assert steps[-1][4]["success"], steps[-1][4]["verdict"]
     finally:
         environment.close()
