@@ -198,10 +198,13 @@ class Session(SimulationSession):
     def _tracked_objects(self) -> list[TrackedObject]:
         """What the map knows that the robot drives on, without starting its updates; in the frame of the world."""
         server, world = self.navigator.server, self.recorder.start.frame_id
-        known = list(server.served.values())[-1].tracked_objects() if isinstance(server, MapServer) else ()
         try:
+            known = list(server.served.values())[-1].tracked_objects() if isinstance(server, MapServer) else ()
             return [one.seen_from(server.runtime.transforms.lookup(world, one.frame_id)) for one in known]
         except TransformError:
+            return []
+        except Exception as error:  # as a map that refuses a scan, it must not stop the physics
+            self.events.emit(EventKind.FAULT, "tracked_objects", type=type(error).__name__, message=str(error))
             return []
 
     def _record_scan(self, scan: RangeScan) -> None:

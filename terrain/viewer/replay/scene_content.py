@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.event_values import well_formed
 from mbf_abstract.geometry import FloatArray
-from terrain.recording.recorded_objects import IS_MOVING, VX, VY, X, Y, Z
+from terrain.recording.recorded_objects import IS_MOVING, VX, VY, RecordedObjects, X, Y, Z
 from terrain.recording.recording import Recording, StampedPoints
 from terrain.viewer.pictures.colours import (
     BODY,
@@ -151,7 +151,6 @@ def _robot(
     angles = wheel_angles(shape, recording.times, twists)
     scans = recording.scans[:: -(-len(recording.scans) // MAX_SCANS)] if recording.scans else []
     scans = [(time, points[:: max(1, len(points) // MAX_SCAN_POINTS)]) for time, points in scans]
-    known = recording.objects[:: -(-len(recording.objects) // MAX_FRAMES) or 1]
     plans = thinned_plans(seen_plans(recording.paths, recording.times[frames]))
     return {
         "name": well_formed(looks.name),
@@ -167,8 +166,16 @@ def _robot(
         "plans": _sets(packer, plans, origin, begin),
         "scans": _sets(packer, scans, origin, begin),
         "scanHold": scan_hold([time for time, _ in scans]),
-        "objects": _sets(packer, [(one.time, velocity_arrows(one.rows)) for one in known], origin, begin),
+        "objects": _sets(
+            packer, [(one.time, velocity_arrows(one.rows)) for one in thinned_looks(recording.objects)], origin, begin
+        ),
     }
+
+
+def thinned_looks(looks: Sequence[RecordedObjects], most: int = MAX_FRAMES) -> list[RecordedObjects]:
+    """About ``most`` of the looks, and all that see nothing: the arrows of the last look stay until the next one."""
+    stride = -(-len(looks) // most) or 1
+    return [look for index, look in enumerate(looks) if index % stride == 0 or not len(look.rows)]
 
 
 def velocity_arrows(rows: FloatArray) -> FloatArray:

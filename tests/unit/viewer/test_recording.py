@@ -8,6 +8,7 @@ import pytest
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
+from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.maps.view import GridView, MeshView
 from terrain.physics.motion_sample import Thing
@@ -213,6 +214,21 @@ def test_a_session_records_what_its_map_tracks():
     row = known[-1].rows[0]
     assert math.dist(row[[X, Y]], (person.pose().x, person.pose().y)) < 0.4
     assert row[[VX, IS_MOVING]].tolist() == pytest.approx([person.velocity()[0], 1.0], abs=0.25)
+
+
+@pytest.mark.parametrize(("scenario", "backend"), [("crowded_corridor", "costmap"), ("bridge", "mesh")])
+def test_a_map_that_fails_to_say_what_moves_does_not_stop_the_physics(scenario, backend, monkeypatch):
+    def raising(self):
+        raise RuntimeError("no objects today")
+
+    with Session(load_scenario(scenario), SessionOptions(backend=backend)) as session:
+        monkeypatch.setattr(ServedMap, "tracked_objects", raising)
+        began = session.simulation.time
+        session.clock.sleep(1.0)
+        assert session.simulation.time > began + 0.9
+        assert session.recorder.objects == []
+        fault = session.memory.of_kind(EventKind.FAULT)[0]
+    assert (fault.data["type"], fault.data["message"]) == ("RuntimeError", "no objects today")
 
 
 def test_parts_of_a_recording_have_their_own_objects():

@@ -206,6 +206,20 @@ def test_what_the_robot_knows_to_move_has_an_arrow_in_the_replay_and_what_stands
     assert points[2, 0] < points[0, 0] < points[4, 0]
 
 
+def test_arrows_end_where_nobody_is_seen_any_more_however_long_the_run(hill_recording, contents_of):
+    walks = TrackedObject(7, Motion.MOVING, 3.0, 2.0, 0.5, 0.0, 0.8, 0.25, 0.05, 0.1, 3.0, 0.0, 0.0, 0.0, "map")
+    gone = 0.2 * MAX_FRAMES + 0.2  # an odd look
+    known = [RecordedObjects.of(0.2 * index, [walks]) for index in range(MAX_FRAMES + 1)]
+    known += [RecordedObjects.of(gone, []), RecordedObjects.of(gone + 60.0, [walks])]
+
+    scene, arrays = contents_of(replay_html(replace(hill_recording, objects=known)))
+
+    objects = scene["robots"][0]["objects"]
+    times, counts = (arrays[objects[name]][:, 0] for name in ("times", "counts"))
+    assert counts[times == round(1000 * gone)].tolist() == [0]
+    assert len(times) < 0.6 * MAX_FRAMES
+
+
 def test_all_robots_of_a_run_are_in_its_replay_each_in_its_colour_with_path_and_track(two_robots, contents_of):
     page = joint_replay_html(two_robots)
     scene, arrays = contents_of(page)

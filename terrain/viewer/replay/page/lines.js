@@ -1,5 +1,6 @@
-// Plans, driven tracks, what sensors see, and the velocities of what the robot knows to move. Plans are wide and dashed,
-// tracks narrow and solid: no colour is needed to know one from the other. What is hidden behind something is drawn once more, faint.
+// Plans, driven tracks, what sensors see, and the velocities of what the robot knows to move. Plans are wide and
+// dashed, tracks narrow and solid: no colour is needed to know one from the other. What is hidden behind something is
+// drawn once more, faint.
 const PLAN = {width: 7, lift: 0.12}, TRACK = {width: 3.5, lift: 0.16};  // pixels; m above the ground and its bumps
 const ARROW = {width: 4, lift: 0};
 const BORDER = 1.5;  // pixels
