@@ -8,11 +8,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
+from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_costmap_nav.control.trajectory_scoring import footprint_discs
 from mbf_costmap_nav.controllers.dwa import DwaController, sample_velocities, sample_window, slowed_down
-from mbf_costmap_nav.controllers.mppi import MppiController
+from mbf_costmap_nav.controllers.mppi import IDLE_CYCLES, MppiController
 from mbf_costmap_nav.critics.obstacle_critic import VALUE_OF_COST
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.kernels.control.critics import alignment, furthest_reached, map_costs, mean_angle_to
@@ -20,6 +21,7 @@ from mbf_costmap_nav.kernels.control.rollout import add_noise, clip_velocities, 
 from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
 
 CONTROLLERS = [DwaController, MppiController]
+CAR = {"motion_model": "ackermann"}
 FREE_MAP = Costmap(np.zeros((200, 200), dtype=np.uint8), 0.05, -5.0, -5.0)
 seeds = st.integers(0, 2**32 - 1)
 
@@ -170,6 +172,20 @@ def test_a_straight_path_is_driven_forward(make_plugin, controller_class):
     for _ in range(5):
         result = controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist.planar(0.2)))
     assert result.command.vx > 0.2 and abs(result.command.wz) < 0.3
+
+
+@pytest.mark.parametrize(("controller_class", "model"), [(DwaController, {}), (MppiController, CAR)])
+def test_a_robot_that_lets_somebody_by_is_not_stuck_and_names_them(make_plugin, controller_class, model):
+    controller = make_plugin(controller_class, FREE_MAP, min_vel_x=0.0, **model)
+    comes = TrackedObject(4, Motion.MOVING, 0.9, 0.0, 0.0, -0.4, 0.0, 0.25, 0.05, 0.1, 5.0, 0.0, 0.0, 0.0, "map")
+    controller.navigation_map.tracked_objects = lambda now: (comes,)
+    controller.set_plan(straight())
+    for _ in range(IDLE_CYCLES + 20):
+        result = controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist()))
+        assert result.success and abs(result.command.vx) < 0.05
+    assert result.hindered_by == "object 4 moves in the way, at (0.90, 0.00)"
+    controller.navigation_map.tracked_objects = lambda now: ()
+    assert controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist())).hindered_by == ""
 
 
 @pytest.mark.parametrize("controller_class", CONTROLLERS)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
+from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_mesh_nav.controllers.mppi import MPPIController
@@ -163,6 +164,19 @@ def test_a_wall_thinner_than_a_step_is_not_jumped_over(make_plugin, plain, paint
         step = 0.05 * result.command.vx * np.array([np.cos(yaw), np.sin(yaw)])
         pose = Pose.planar(pose.x + step[0], pose.y + step[1], yaw)
     assert 2.0 < pose.x < 2.95
+
+
+def test_a_robot_that_lets_somebody_by_is_not_stuck_and_names_them(make_plugin, plain):
+    controller = make_plugin(MPPIController, plain())
+    comes = TrackedObject(4, Motion.MOVING, 1.7, 3.0, 0.0, -0.4, 0.0, 0.25, 0.05, 0.1, 5.0, 0.0, 0.0, 0.0, "map")
+    controller.mesh_map.tracked_objects = lambda now: (comes,)
+    controller.set_plan(straight_path())
+    for _ in range(40):
+        result = controller.compute_velocity_commands(ControlRequest(Pose.planar(0.8, 3.0), Twist()))
+        assert result.success and result.command.vx < 0.2
+    assert result.hindered_by == "object 4 moves in the way, at (1.70, 3.00)"
+    controller.mesh_map.tracked_objects = lambda now: ()
+    assert controller.compute_velocity_commands(ControlRequest(Pose.planar(0.8, 3.0), Twist())).hindered_by == ""
 
 
 def test_walled_in_on_all_sides_it_finds_no_valid_command(make_plugin, plain, paint):
