@@ -192,11 +192,3 @@ def test_a_path_that_leaves_the_map_is_not_valid_from_there_on(crew):
     far = [at(0.0), at(1.0), at(crew.map_size), at(crew.map_size + 1.0)]
     assert ask(crew, "is_path_valid", {"path": {"poses": far}})["invalid_pose_indices"] == [2, 3]
     assert not ask(crew, "is_path_valid", {"path": {"poses": []}})["is_valid"]
-
-
-@ON_COSTMAP
-def test_costmaps_are_cleared(crew):
-    for name in ("global", "local"):
-        ask(crew, f"{name}_costmap/clear_entirely_{name}_costmap", {})
-        ask(crew, f"{name}_costmap/clear_around_{name}_costmap", {"reset_distance": 2.0})
-        ask(crew, f"{name}_costmap/clear_except_{name}_costmap", {"reset_distance": 2.0})
