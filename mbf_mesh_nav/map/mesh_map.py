@@ -69,13 +69,14 @@ class MeshMap(LayeredMap):
         frame_id: str = "map",
         report: MeshReport | None = None,
         inscribed_radius: float = 0.0,
+        locator: SurfaceLocator | None = None,
     ) -> None:
         super().__init__()
         self.topology = topology
         self.frame_id = frame_id
         self.inscribed_radius = inscribed_radius
         self.report = report if report is not None else MeshReport()
-        self.locator = SurfaceLocator(topology)
+        self.locator = SurfaceLocator(topology) if locator is None else locator
         self.vertices = topology.vertices
         self.faces = topology.faces
         self.vertex_normals = topology.vertex_normals

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -23,12 +23,13 @@ from mbf_mesh_nav.arrays import FlagArray, FloatArray
 from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
-from mbf_mesh_nav.map.places import OUTSIDE
+from mbf_mesh_nav.map.places import OUTSIDE, MeshPlaces
 from mbf_mesh_nav.map.places import SURFACE_DISTANCE as OF_PLACES
 from mbf_mesh_nav.mesh.ground import ground_heights
 from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE as OF_ROBOTS
 from mbf_mesh_nav.mesh.motion_check import UNKNOWN_RADIUS
 from mbf_mesh_nav.tiles.portals import NOT_CANCELLED
+from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED
 from mbf_mesh_nav.tiles.serving.overview import overview
 from mbf_mesh_nav.tiles.serving.recently_used import RecentlyUsed
 from mbf_mesh_nav.tiles.serving.squares import Squares
@@ -63,8 +64,6 @@ class TiledNavigationMap(LayeredMap):
         A tile is damaged.
     """
 
-    layers: LayerGraph
-
     def __init__(
         self,
         tiled: TiledMap,
@@ -80,8 +79,13 @@ class TiledNavigationMap(LayeredMap):
         self._radius, self._max_turning_slope = inscribed_radius, max_turning_slope
         self._squares = Squares(tiled)
         self._window = None if window is None else FollowingWindow(tiled, self._squares, window)
-        self.layers = LayerGraph() if self._window is None else self._window.now.map.layers
+        self._no_layers = LayerGraph()
         self._views: RecentlyUsed[str, GridView] = RecentlyUsed(self._picture, len(tiled.index.layers))
+
+    @property
+    def layers(self) -> LayerGraph:  # type: ignore[override]
+        """Those of the window, other ones when it has moved."""
+        return self._no_layers if self._window is None else self._window.now.map.layers
 
     @property
     def inscribed_radius(self) -> float:
@@ -118,7 +122,8 @@ class TiledNavigationMap(LayeredMap):
                 return
         try:
             if self._window is not None:
-                self.tiled.lay_over(self._window.now.sensed())
+                window = self._window.now
+                self.tiled.lay_over(window.sensed(window.map.snapshot()))
             yield True
         finally:
             self._searching.release()
@@ -131,7 +136,6 @@ class TiledNavigationMap(LayeredMap):
         self._views.clear()
         if self._window is not None:
             self._window.renew()
-            self.layers = self._window.now.map.layers
 
     def view(self, layer: str) -> GridView:
         """The costs of a layer from above; the first time, and after a change, all tiles are read for it.
@@ -155,10 +159,10 @@ class TiledNavigationMap(LayeredMap):
         """
         self._check_reach(radius)
         window = None if self._window is None else self._window.now
-        if window is None:
-            found = self._squares.around(x, y, radius)
-        else:
-            found = window.map if window.holds(x, y, radius) else self._squares.around(x, y, radius, window.sensed())
+        if window is not None and window.holds(x, y, radius):
+            return self._for_robot(window.map)
+        sensed = NOTHING_SENSED if window is None else window.sensed(window.map.snapshot())
+        found = self._squares.around(x, y, radius, sensed)
         return None if found is None else self._for_robot(found)
 
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
@@ -186,26 +190,44 @@ class TiledNavigationMap(LayeredMap):
 
     # -------------------------------------------------------------------------------------------------- places
     def point_check(self) -> PlaceCheck:
-        """State and interpolated cost of the surface at points."""
+        """State and interpolated cost of the surface at points, on the map as it is now."""
+        places = self._places(OF_PLACES + self.inscribed_radius)
 
         def check(point: Pose) -> PlaceAnswer:
-            there = self.around(point.x, point.y, OF_PLACES + self.inscribed_radius)
-            return OUTSIDE if there is None else there.places().check_point(point)
+            there = places(point.x, point.y)
+            return OUTSIDE if there is None else there.check_point(point)
 
         return check
 
     def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
-        """State and summed cost below the robot's disc; ValueError if that is wider than ``reach``."""
-        radius = OF_PLACES + self.inscribed_radius + query.safety_dist
+        """State and summed cost below the robot's disc, on the map as it is now.
 
-        def check(pose: Pose) -> PlaceAnswer:
-            there = self.around(pose.x, pose.y, radius)
-            return OUTSIDE if there is None else there.places().check_pose(pose, query)
-
+        ValueError if the disc is wider than ``reach``.
+        """
         if center_only:
             return self.point_check()
-        self._check_reach(radius)
+        places = self._places(OF_PLACES + self.inscribed_radius + query.safety_dist)
+
+        def check(pose: Pose) -> PlaceAnswer:
+            there = places(pose.x, pose.y)
+            return OUTSIDE if there is None else there.check_pose(pose, query)
+
         return check
+
+    def _places(self, radius: float) -> Callable[[float, float], MeshPlaces | None]:
+        """What can be asked of the surroundings of places, all of them on the map as it is now; see ``around``."""
+        self._check_reach(radius)
+        window = None if self._window is None else self._window.now
+        near = None if window is None else self._for_robot(window.map).places()
+        sensed = NOTHING_SENSED if window is None or near is None else window.sensed(near.snapshot)
+
+        def places(x: float, y: float) -> MeshPlaces | None:
+            if window is not None and window.holds(x, y, radius):
+                return near
+            found = self._squares.around(x, y, radius, sensed)
+            return None if found is None else self._for_robot(found).places()
+
+        return places
 
     def find_valid_pose(
         self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
@@ -248,10 +270,7 @@ class TiledNavigationMap(LayeredMap):
         """Take in what sensors have seen, see ``FollowingWindow.update``; overrides of parameters that are over end."""
         self.end_overrides(now)
         if self._window is not None:
-            try:
-                self._window.update(robot_pose, now)
-            finally:
-                self.layers = self._window.now.map.layers
+            self._window.update(robot_pose, now)
 
     def stale_reason(self, now: float) -> str:
         """Why the map is not current at ``now`` [s]; without a window it is."""

@@ -46,32 +46,35 @@ class Surroundings:
     Attributes
     ----------
     map : MeshMap
+        With the stored values.
     numbers : (V,) int64
         Numbers of its vertices in the whole map.
     """
 
     def __init__(self, mesh_map: MeshMap, numbers: NDArray[np.int64]) -> None:
         self.map, self.numbers = mesh_map, numbers
-        self._stored, self._shown = mesh_map.layers, mesh_map.default_layer
-        self._sensed = NOTHING_SENSED
+        self._last = NOTHING_SENSED, mesh_map
         self._lock = threading.Lock()
 
     def with_sensed(self, sensed: SensedCosts) -> MeshMap:
-        """The map, from now on with the worse of the stored and the sensed costs; they are its layer "sensed"."""
-        with self._lock:
-            if sensed is not self._sensed:
-                self._lay_over(sensed)
-                self._sensed = sensed
-        return self.map
+        """A map with the worse of the stored and the sensed costs; they are its layer "sensed".
 
-    def _lay_over(self, sensed: SensedCosts) -> None:
-        stored, factor = self._stored[str(self._shown)], self.map.edge_cost_factor
+        It stays as it is when others ask for another one.
+        """
+        with self._lock:
+            if sensed is not self._last[0]:
+                self._last = sensed, self._laid_over(sensed)
+            return self._last[1]
+
+    def _laid_over(self, sensed: SensedCosts) -> MeshMap:
+        stored = self.map.layers[str(self.map.default_layer)]
         values = sensed.laid_over(self.numbers, stored.costs, stored.lethal)
-        if values is not None:
-            raised = stored_layer(self.map, SENSED, *values)
-            self.map.set_layers(LayerGraph([*self._stored.values(), raised]), SENSED, factor)
-        elif self.map.default_layer != self._shown:
-            self.map.set_layers(self._stored, self._shown, factor)
+        if values is None:
+            return self.map
+        over = MeshMap(self.map.topology, self.map.frame_id, locator=self.map.locator)
+        layers = LayerGraph([*self.map.layers.values(), stored_layer(over, SENSED, *values)])
+        over.set_layers(layers, SENSED, self.map.edge_cost_factor)
+        return over
 
 
 def mesh_within(

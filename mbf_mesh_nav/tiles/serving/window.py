@@ -18,11 +18,14 @@ from mbf_abstract.geometry import Pose
 from mbf_mesh_nav.map.layer import LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED, SensedCosts
 from mbf_mesh_nav.tiles.serving.squares import BEYOND, Squares
 from mbf_mesh_nav.tiles.serving.surroundings import StoredLayer, Surroundings, stored_layer
 from mbf_mesh_nav.tiles.serving.window_settings import MOVES_AT, SHOWN, WindowSettings
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
+
+UNKNOWN_POSE = "the pose of the robot is unknown, so the window is not around it"
 
 
 class Window:
@@ -97,9 +100,9 @@ class Window:
     def _distance(self, x: float, y: float) -> float:
         return max(abs(x - self.middle[0]), abs(y - self.middle[1]))
 
-    def sensed(self) -> SensedCosts:
-        """Where the map is worse than what is stored; the same value as long as it is the same."""
-        snapshot, (version, last) = self.map.snapshot(), self._last
+    def sensed(self, snapshot: MeshSnapshot) -> SensedCosts:
+        """Where a snapshot of the map is worse than what is stored; the same value as long as it is the same."""
+        version, last = self._last
         if snapshot.version == version:
             return last
         raised = (snapshot.costs > self._stored.costs) | (snapshot.lethal & ~self._stored.lethal)
@@ -131,7 +134,8 @@ class FollowingWindow:
 
     def __init__(self, tiled: TiledMap, squares: Squares, settings: WindowSettings) -> None:
         self._tiled, self._squares, self._settings = tiled, squares, settings
-        self._problem = ""
+        self._problem = UNKNOWN_POSE if self.senses else ""
+        self._time: float | None = None  # of the last update [s]
         self._updating = threading.RLock()
         x, y, _ = squares.tile(tiled.index.tiles[0].key).vertices[0].tolist()
         first = self._opened(x, y, None)
@@ -146,6 +150,9 @@ class FollowingWindow:
     def update(self, robot: Pose | None, now: float) -> None:
         """Take in what sensors have seen up to ``now`` [s], on another window if the robot is too near the edge.
 
+        Scans wait until the robot's pose is known for the first time. If the robot is out of the last window, what was
+        seen is forgotten as by a clearing: it was not around the robot.
+
         Raises
         ------
         MeshError
@@ -154,14 +161,16 @@ class FollowingWindow:
             What a layer raises, likewise.
         """
         with self._updating:
-            window = self.now if robot is None else self._around(robot)
-            try:
-                window.map.update(None, now)
-            finally:
-                self.now = window
+            window = self._around(robot)
+            if robot is not None or self._time is not None:
+                self._time = now
+                self._show(window)
 
     def stale_reason(self, now: float) -> str:
-        """Why it is not current at ``now`` [s]: not around the robot, a layer that raised, a silent sensor."""
+        """Why it is not current at ``now`` [s]: not around the robot, a layer that raised, a silent sensor.
+
+        Without layers that sense it only has to be around a robot whose pose is known and on the surface.
+        """
         return self._problem or self.now.map.stale_reason(now)
 
     def cleared(self, clear: Callable[[MeshMap], list[str]]) -> list[str]:
@@ -179,19 +188,37 @@ class FollowingWindow:
     def renew(self) -> None:
         """Cut it out again where it is, because the tiles have changed; raises as ``update``."""
         with self._updating:
-            self.now = self._opened(*self.now.middle, self.now) or self.now
+            self._show(self._opened(*self.now.middle, self.now) or self.now)
 
-    def _around(self, robot: Pose) -> Window:
+    def _show(self, window: Window) -> None:
+        """Bring a window up to date and show it; one on which a layer raises is stale."""
+        try:
+            if self._time is not None:
+                window.map.update(None, self._time)
+        finally:
+            self.now = window
+
+    def _around(self, robot: Pose | None) -> Window:
+        """The window for a robot; the last one and a reason where there is none around it."""
+        if robot is None:
+            return self._kept(UNKNOWN_POSE)
         if self.now.is_central(robot.x, robot.y):
-            self._problem = ""
-            return self.now
+            return self._kept("")
         try:
             moved = self._opened(robot.x, robot.y, self.now)
+            if moved is not None and self._time is not None and not self.now.holds(robot.x, robot.y, 0.0):
+                moved.map.clear()
         except BaseException as error:
             self._problem = f"the window around the robot cannot be made: {error_text(error)}"
             raise
+        if moved is None:
+            return self._kept(f"there is no surface around the robot at ({robot.x:.2f}, {robot.y:.2f})")
         self._problem = ""
-        return moved or self.now  # a robot off the surface
+        return moved
+
+    def _kept(self, problem: str) -> Window:
+        self._problem = problem if self.senses else ""
+        return self.now
 
     def _opened(self, x: float, y: float, old: Window | None) -> Window | None:
         """A window around a place [m]; None where there is no surface."""

@@ -83,7 +83,7 @@ def window_settings(
         layers=(*stored, *entries, shown), default_layer=default, inscribed_radius=inscribed_radius
     )
     plan = plan_mesh_layers(parameters, blocks or {}, lambda name: OWN_TYPES.get(name) or load(name))
-    findings = [*_senseless(plan, live), *_too_wide(plan, side)]
+    findings = [*_senseless(plan, live), *_forgetful(plan), *_too_wide(plan, side)]
     if default not in live:
         findings.append(f"default_layer {default!r}: expected one of the listed layers, {', '.join(sorted(live))}")
     if findings:
@@ -103,6 +103,17 @@ def _senseless(plan: Sequence[PlannedLayer[MeshLayer]], live: frozenset[str]) ->
         "with it and leave it out here"
         for name in (planned.entry.name for planned in plan)
         if name in live and name not in sensing
+    ]
+
+
+def _forgetful(plan: Sequence[PlannedLayer[MeshLayer]]) -> list[str]:
+    """Findings about layers that sense and would know nothing on the next window."""
+    return [
+        f"layer {planned.entry.name!r} takes scans and does not override 'take_over', so its obstacles would be lost "
+        "whenever the window moves"
+        for planned in plan
+        if planned.layer_class.insert_scan is not MeshLayer.insert_scan
+        and planned.layer_class.take_over is MeshLayer.take_over
     ]
 
 

@@ -16,7 +16,8 @@ from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_abstract.testing.loopback import LoopbackSession
-from mbf_mesh_nav.layers.obstacle import ObstacleParameters
+from mbf_mesh_nav.layers.obstacle import ObstacleLayer, ObstacleParameters
+from mbf_mesh_nav.map.layer import MeshLayer
 from mbf_mesh_nav.map.map_builder import MeshLayerEntry
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.planners.hierarchical import HierarchicalPlanner
@@ -154,7 +155,7 @@ def test_what_was_seen_is_forgotten_when_the_window_has_left_it(tiled_hills, hil
     most = (SIDE / SPACING + 6.0) ** 2
     for _ in drive(tiled, whole, way):
         assert len(tiled.window_map.vertices) < most
-    behind = [*drive(tiled, whole, way[:1])]
+    behind = [*drive(tiled, whole, way[:2])]
     hits = tiled.layers["obstacles"]._hits.points
     assert len(hits) < len(whole.map.layers["obstacles"]._hits.points)
     assert np.abs(hits[:, :2] - behind[0][:2]).max() <= 0.5 * SIDE + 3.0 * SPACING
@@ -176,7 +177,7 @@ def test_silence_and_clearing_make_the_map_stale_also_after_the_window_has_moved
     tiled.update(pose(way[0]), 0.0)
     assert "'lidar' has not sent anything yet" in tiled.stale_reason(0.0)
     tiled.insert_scan(scan(way[0], way[2][None] + (0.0, 0.0, 0.4), 0.1))
-    for robot, now in ((way[0], 0.2), (way[12], 0.4)):
+    for robot, now in ((way[0], 0.2), (way[6], 0.4)):
         tiled.update(pose(robot), now)
         assert not tiled.stale_reason(now)
     assert "silent for 1.20 s" in tiled.stale_reason(1.3)
@@ -202,7 +203,64 @@ def test_a_window_that_cannot_be_cut_out_holds_the_robot_until_it_can(tiled_hill
     assert f"tile_{key[0]}_{key[1]}.npz" in tiled.stale_reason(0.1)
     tile_file(folder, key).write_bytes(sound)
     tiled.update(pose(way[20]), 0.2)
-    assert not tiled.stale_reason(0.2)
+    tiled.insert_scan(scan(way[20], way[22][None] + (0.0, 0.0, 0.4), 0.3))
+    tiled.update(pose(way[20]), 0.3)
+    assert not tiled.stale_reason(0.3)
+
+
+def test_scans_wait_for_a_window_around_the_robot_and_the_map_is_stale_without_one(tiled_hills, way):
+    tiled = sensing_map(tiled_hills)
+    tiled.insert_scan(scan(way[12], way[14][None] + (0.0, 0.0, 0.4), 0.0))
+    tiled.update(None, 0.1)
+    assert "the pose of the robot is unknown" in tiled.stale_reason(0.1)
+    tiled.update(pose(way[12]), 0.2)
+    assert not tiled.stale_reason(0.2) and tiled.point_check()(pose(way[14])).state == CellState.LETHAL
+    tiled.update(None, 0.3)
+    assert "the pose of the robot is unknown" in tiled.stale_reason(0.3)
+    tiled.update(Pose.planar(200.0, 200.0), 0.4)
+    assert "no surface around the robot at (200.00, 200.00)" in tiled.stale_reason(0.4)
+    tiled.update(pose(way[12]), 0.5)
+    assert not tiled.stale_reason(0.5)
+
+
+def test_a_window_that_the_robot_has_jumped_to_is_stale_until_it_is_seen(tiled_hills, way):
+    tiled = sensing_map(tiled_hills)
+    for robot, now in ((way[0], 0.0), (way[20], 0.2)):
+        tiled.update(pose(robot), now)
+        assert tiled.stale_reason(now)
+        tiled.insert_scan(scan(robot, robot[None] + (1.0, 0.0, 0.4), now + 0.1))
+        tiled.update(pose(robot), now + 0.1)
+        assert not tiled.stale_reason(now + 0.1)
+
+
+def test_on_tiles_that_have_changed_predictions_stay_and_a_layer_that_raises_is_reported(
+    tiled_hills, whole_hills, way, tmp_path, monkeypatch
+):
+    entries = (ENTRIES[0], MeshLayerEntry(name="moving", type="moving_obstacles", inputs=("obstacles",)))
+    blocks = {"obstacles": SENSING["obstacles"], "moving": {"sources": ("lidar",)}}
+    tiled = sensing_map(shutil.copytree(tiled_hills, tmp_path / "map"), blocks, entries=entries)
+    key = tuple((way[10][:2] // 12.0).astype(int))
+    tile = tiled.tiled.tile(key)[0]
+    row = tiled.tiled.index.layers.index("safe")
+    same = key, "safe", tile.costs[row].copy(), tile.lethal[row].copy()
+    box = np.random.default_rng(3).uniform(-0.2, 0.2, (8, 2))
+    for step in range(10):
+        seen = above_ground(whole_hills, box + way[10][:2] + (0.15 * step, 1.0), 0.6)
+        tiled.insert_scan(scan(way[10], seen, 0.1 * step))
+        tiled.update(pose(way[10]), 0.1 * step)
+    before = tiled.layers["moving"].costs.copy()
+    assert ((before > 0.0) & (before < 1.0)).any()
+    tiled.change_layer(*same)
+    assert np.array_equal(tiled.layers["moving"].costs, before)
+
+    def broken(layer, now):
+        raise ArithmeticError("broken")
+
+    monkeypatch.setattr(ObstacleLayer, "update", broken)
+    for change in (lambda: tiled.update(pose(way[10]), 1.0), lambda: tiled.change_layer(*same)):
+        with pytest.raises(ArithmeticError):
+            change()
+        assert "broken" in tiled.stale_reason(1.0)
 
 
 # --------------------------------------------------------------------------------------------------- questions
@@ -253,6 +311,24 @@ def test_a_place_beyond_the_edge_sees_what_was_sensed_within_it(tiled_hills, who
     assert tiled.nearest_obstacle(beyond, 3.0) is not None
     tiled.clear()
     assert tiled.pose_check(NEAR)(beyond) == before
+
+
+def test_a_check_of_many_places_is_that_of_one_map(tiled_hills, whole_hills, way):
+    """Places within the window and beyond its edge; another search asks about what has been seen since."""
+    tiled = sensing_map(tiled_hills)
+    robot, ground, place = next(pairs_over_the_edge(tiled, whole_hills, way))
+    within, beyond = pose(ground), pose(place)
+    before, points = tiled.pose_check(NEAR), tiled.point_check()
+    expected = before(within), before(beyond), points(within)
+    around = tiled.around(beyond.x, beyond.y, 2.0)
+    costs = around.snapshot().costs.copy()
+    tiled.insert_scan(scan(robot, ground[None] + (0.0, 0.0, 0.4), 0.1))
+    tiled.update(pose(robot), 0.1)
+    after = tiled.pose_check(NEAR)
+    assert after(within).state == after(beyond).state == CellState.LETHAL != expected[1].state
+    assert (before(within), before(beyond), points(within)) == expected
+    assert after(beyond).state == CellState.LETHAL
+    assert np.array_equal(around.snapshot().costs, costs)
 
 
 # --------------------------------------------------------------------------------------------------- plans
@@ -386,6 +462,15 @@ def test_layers_that_do_not_belong_in_a_window_are_refused_at_the_start(tiled_hi
     with LoopbackSession(Pose.planar(0.0, 0.0)) as session, pytest.raises(LayerListError) as caught:
         serve(session, tmp_path, config(tiled_hills, block=f"  {text}\n"))
     assert finding in str(caught.value) and "robot.yaml: tiled_map: " in str(caught.value)
+
+
+def test_a_layer_that_would_lose_its_obstacles_when_the_window_moves_is_refused(tiled_hills):
+    class Forgetful(ObstacleLayer):
+        take_over = MeshLayer.take_over
+
+    tiled, entry = TiledMap(tiled_hills), MeshLayerEntry(name="mine", type="forgetful")
+    with pytest.raises(LayerListError, match="layer 'mine' takes scans and does not override 'take_over'"):
+        window_settings(tiled, SIDE, (entry,), {}, load_layer=lambda name: Forgetful)
 
 
 def test_parameters_of_sensing_layers_change_and_last_those_of_the_tiles_do_not(tiled_hills, way, tmp_path):
