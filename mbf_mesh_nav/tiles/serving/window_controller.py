@@ -15,6 +15,7 @@ import numpy as np
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult, PlannedMotion
 from mbf_mesh_nav.plugins import MeshContext, MeshController
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
@@ -34,6 +35,7 @@ class WindowController(AbstractController):
         super().__init__(context)
         self._class, self._context, self._map = controller_class, context, context.navigation_map
         self._tracker: PathTracker | None = None
+        self._accepted = True
         self._inner = self._made()
         self.modelled_compute_time = self._inner.modelled_compute_time
 
@@ -44,7 +46,7 @@ class WindowController(AbstractController):
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path, which may lead out of the window."""
-        self._tracker = None
+        self._tracker, self._accepted = None, True
         accepted = self._on_window().set_plan(path)
         if accepted:
             self._tracker = PathTracker(path)
@@ -53,7 +55,11 @@ class WindowController(AbstractController):
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle of the controller on the present window."""
         self._follow(request.pose)
-        return self._on_window().compute_velocity_commands(request)
+        inner = self._on_window()
+        if not self._accepted:
+            text = "the controller does not take what is left of the path on another window"
+            return ControlResult(ExePathOutcome.INVALID_PATH, text)
+        return inner.compute_velocity_commands(request)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """As the controller."""
@@ -69,9 +75,13 @@ class WindowController(AbstractController):
         return self._inner.planned_motion()
 
     def parameters_changed(self) -> None:
-        """Hand them on."""
-        self._inner.parameters = self.parameters
-        self._inner.parameters_changed()
+        """Hand them on; those that the controller refuses are not kept."""
+        old, self._inner.parameters = self._inner.parameters, self.parameters
+        try:
+            self._inner.parameters_changed()
+        except BaseException:
+            self._inner.parameters = old
+            raise
 
     def _follow(self, pose: Pose) -> None:
         if self._tracker is not None:
@@ -82,7 +92,7 @@ class WindowController(AbstractController):
         if self._inner.mesh_map is not self._map.window_map:
             self._inner = self._made()
             if self._tracker is not None:
-                self._inner.set_plan(_left(self._tracker))
+                self._accepted = self._inner.set_plan(_left(self._tracker))
         return self._inner
 
     def _made(self) -> MeshController:
