@@ -57,6 +57,12 @@ def timed(call: Callable[[], object]) -> float:
     return 1e3 * (time.process_time() - begun)
 
 
+def turn(navigation_map: TiledNavigationMap) -> None:
+    """Lay what was sensed over the tiles, as every search begins."""
+    with navigation_map.turn_to_search():
+        pass
+
+
 def drive(folder: Path, metres: int) -> dict[str, Any]:
     """Figures of one drive through the middle of the map along x."""
     tiled = TiledMap(folder)
@@ -86,10 +92,9 @@ def drive(folder: Path, metres: int) -> dict[str, Any]:
         times["scan_to_cost"].append(timed(take))
         vertices.append(len(navigation_map.window_map.vertices))
         if step % PLAN_EVERY == 0:
-            window = navigation_map._window
-            assert window is not None
-            times["overlay"].append(timed(lambda window=window: tiled.lay_over(window.now.sensed())))  # type: ignore[misc]
-            sensed.append(len(window.now.sensed().numbers))
+            times["overlay"].append(timed(lambda: turn(navigation_map)))
+            shown, stored = navigation_map.window_map.snapshot(), navigation_map.layers[tiled.profile_layer]
+            sensed.append(int(((shown.costs > stored.costs) | (shown.lethal & ~stored.lethal)).sum()))
             ends = np.array(robot.position), np.array((x + PLAN_LENGTH, y, ground[0]))
             for name in ("plan", "again"):
                 times[name].append(timed(lambda ends=ends: plan_on_tiles(tiled, *ends, surface_distance=60.0)))  # type: ignore[misc]
