@@ -179,14 +179,7 @@ local_costmap:
 """
 )
 
-MESH = (
-    PLUGINS
-    + """
-backend: mesh
-planners: [{name: cvp, type: cvp}]
-controllers: [{name: follower, type: path_follower}]
-mesh_map:
-  mesh_file: floor.ply
+SENSING_LAYERS = """\
   inscribed_radius: 0.3
   default_layer: safe
   layers:
@@ -198,6 +191,17 @@ mesh_map:
   moving: {sources: [lidar], inscribed_radius: 0.3}
   inflation: {inscribed_radius: 0.3, inflation_radius: 0.5, lethal_value: .inf, inscribed_value: 1.0}
 """
+
+MESH = (
+    PLUGINS
+    + """
+backend: mesh
+planners: [{name: cvp, type: cvp}]
+controllers: [{name: follower, type: path_follower}]
+mesh_map:
+  mesh_file: floor.ply
+"""
+    + SENSING_LAYERS
 )
 
 TILES = (
@@ -208,17 +212,8 @@ planners: [{name: far, type: tiles.hierarchical}]
 controllers: [{name: follower, type: path_follower}]
 tiled_map:
   folder: floor
-  inscribed_radius: 0.3
-  default_layer: safe
-  layers:
-    - {name: obstacles, type: obstacle}
-    - {name: moving, type: moving_obstacles, inputs: [obstacles]}
-    - {name: inflation, type: inflation, inputs: [moving]}
-    - {name: safe, type: max_combination, inputs: [inflation, moving]}
-  obstacles: {sources: [lidar]}
-  moving: {sources: [lidar], inscribed_radius: 0.3}
-  inflation: {inscribed_radius: 0.3, inflation_radius: 0.5, lethal_value: .inf, inscribed_value: 1.0}
 """
+    + SENSING_LAYERS
 )
 
 GRAPH = (

@@ -5,16 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import trimesh
 
-from mbf_abstract.commands.standing_server import read_config_text, standing_server
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.pull_out import find_pull_out, way_in_plane
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.maps.recoveries.give_way import GiveWayParameters, GiveWayRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
-from mbf_abstract.server.announcer import Announcer
 from mbf_abstract.testing.contract.recovery import RigMotion
 from mbf_abstract.testing.contract.rig import rig
 from mbf_abstract.time.cancel import CancelToken
@@ -23,7 +20,6 @@ from mbf_abstract.traffic.right_of_way import in_each_others_way, right_of_way
 from mbf_abstract.traffic.traffic import SharedChannel, Traffic
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 RADIUS = 0.2  # m, of the robot
 START = Pose.planar(4.5, 3.0)
@@ -431,23 +427,3 @@ def test_a_drive_that_somebody_stops_goes_on_once_they_are_gone(give_way, world)
     assert stops
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
     assert abs(motion.end.y - 3.0) > 0.5
-
-
-CORNERS = "[[0.4, 0.3], [0.4, -0.3], [-0.3, -0.3], [-0.3, 0.3]]"
-COSTMAP = f"{{width: 4.0, height: 4.0, footprint_padding: 0.0, footprint: '{CORNERS}'}}"
-OUTLINES = {
-    "costmap": (f"global_costmap: {COSTMAP}\nlocal_costmap: {COSTMAP}", 0.5),
-    "mesh": ("mesh_map: {mesh_file: MESH, inscribed_radius: 0.35, layers: []}", 0.35),
-}
-
-
-@pytest.mark.parametrize("backend", OUTLINES)
-def test_a_robot_announces_how_large_it_is(backend, tmp_path):
-    text, radius = OUTLINES[backend]
-    trimesh.Trimesh(*heightfield_mesh(np.zeros((9, 9)), 0.5, 0.5), process=False).export(tmp_path / "floor.ply")
-    text = f"backend: {backend}\nplanners: []\ncontrollers: []\n{text}".replace("MESH", str(tmp_path / "floor.ply"))
-    cls, config = read_config_text(text)
-    channel = SharedChannel()
-    with standing_server(cls, config) as server:
-        Announcer(server, "anna", channel).announce()
-    assert channel.latest()[0].radius == pytest.approx(radius, rel=0.01)
