@@ -10,9 +10,8 @@ from mbf_abstract.actions.exe_path import ExePathAction
 from mbf_abstract.actions.get_path import GetPathAction
 from mbf_abstract.actions.move_base_states import MoveBaseState, Trigger
 from mbf_abstract.actions.recovery import RecoveryAction
+from mbf_abstract.actions.recovery_sequence import RecoverySequence
 from mbf_abstract.actions.refine_path import RefinePathAction
-from mbf_abstract.actions.stuck_monitor import StuckMonitor
-from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.motion_watch import OscillationDetector
 from mbf_abstract.execution.plan_check import in_global_frame
@@ -31,7 +30,6 @@ from mbf_abstract.goals.goal_types import (
 )
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
-from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.plugin_table import PluginTable
 from mbf_abstract.time.clock import Stopwatch
 
@@ -58,7 +56,6 @@ class MoveBaseMachine:
 
     def __init__(self, sub_actions: SubActions, plugins: PluginTable, job: Job, target: Pose) -> None:
         self._sub_actions = sub_actions
-        self._plugins = plugins
         self._runtime = job.action.runtime
         self._job = job
         self._target = target
@@ -66,13 +63,10 @@ class MoveBaseMachine:
         self._plan: AnyGoalHandle | None = None
         self._follow: AnyGoalHandle | None = None
         self._recover: AnyGoalHandle | None = None
-        self._trigger = Trigger.NONE
-        self._failure: End | None = None
+        self._failure: tuple[Trigger, End] | None = None
         self._ending: End | None = None
-        self._next_behavior = 0
-        self._monitor = StuckMonitor(self._runtime)
+        self._recoveries = RecoverySequence(self._runtime, plugins)
         self._oscillation = OscillationDetector(self._runtime.clock)
-        self._recovered_at: Pose | None = None
         self._replan_watch = Stopwatch(self._runtime.clock)
         self._condition = self._runtime.clock.condition()
         self._mailbox: deque[AnyGoalHandle] = deque()
@@ -91,7 +85,7 @@ class MoveBaseMachine:
     def run(self) -> End:
         """Work until the goal has its end."""
         self._job.handle.on_wake(self.wake)
-        self._monitor.restart(self._runtime.parameters.escalation_behaviors)
+        self._recoveries.restart()
         self._ask_for_plan()
         try:
             end = None
@@ -166,8 +160,7 @@ class MoveBaseMachine:
             self._follow_path(result.refined_path)
             return None
         if result.success and result.path is not None:
-            if self._trigger is Trigger.PLAN:
-                self._reset_recovery()
+            self._recoveries.note_plan()
             refiner = self._runtime.parameters.plan_refiner
             if refiner:
                 goal = RefinePathGoal(result.path, refiner, concurrency_slot=SUB_GOAL_SLOT)
@@ -241,7 +234,7 @@ class MoveBaseMachine:
         feedback: ExePathFeedback = message.feedback
         self._job.handle.publish_feedback(feedback)
         parameters, pose = self._runtime.parameters, feedback.current_pose
-        self._reset_recovery_after_motion(pose)
+        self._recoveries.note_motion(pose)
         if self._oscillation.check(
             pose, parameters.oscillation_timeout, parameters.oscillation_distance, parameters.oscillation_angle
         ):
@@ -268,58 +261,26 @@ class MoveBaseMachine:
     # -------------------------------------------------------------------------------------- recovery
     def _recover_from(self, trigger: Trigger, failure: End) -> End | None:
         """Run the behaviour that is due; without one the failure is the goal's end."""
-        self._trigger = trigger
-        self._monitor.note_failure(failure[0])
-        behavior = self._due_behavior() if self._runtime.parameters.recovery_enabled else ""
+        self._recoveries.note_failure(trigger, failure[0])
+        behavior = self._recoveries.due_behavior(self._job.handle.goal.recovery_behaviors)
         if not behavior:
-            return failure[0], self._monitor.described(failure[1])
+            return failure[0], self._recoveries.described(failure[1])
         self._enter(MoveBaseState.RECOVERY, behavior=behavior, trigger=trigger.value, failure=failure[1])
         self._recover = self._send(self._sub_actions.recovery, RecoveryGoal(behavior, concurrency_slot=SUB_GOAL_SLOT))
         return None
 
-    def _due_behavior(self) -> str:
-        """Return the next one of the list; for a robot that is stuck, or after the list, that of the escalation."""
-        behaviors = self._behaviors()
-        if self._monitor.escalates or self._next_behavior >= len(behaviors):
-            return self._monitor.next_behavior()
-        self._next_behavior += 1
-        return behaviors[self._next_behavior - 1]
-
     def _on_recovered(self, result: Any) -> End | None:
-        self._monitor.note_recovery(result.used_plugin, result.outcome)
+        self._recoveries.note_end(result.used_plugin, result.outcome)
         self._oscillation.reset()
-        try:
-            self._recovered_at = self._runtime.robot.pose()
-        except RobotStateError:  # the next plan reports the missing pose with its own text
-            self._recovered_at = None
         self._ask_for_plan()
         return None
-
-    def _behaviors(self) -> list[str]:
-        wanted = self._job.handle.goal.recovery_behaviors
-        if wanted is not None:
-            return list(wanted)
-        parameters = self._runtime.parameters
-        kept_back = {*parameters.escalation_behaviors, parameters.right_of_way_behavior}
-        return [name for name in self._plugins.names(PluginKind.RECOVERY) if name not in kept_back]
-
-    def _reset_recovery_after_motion(self, pose: Pose) -> None:
-        if self._trigger in (Trigger.CONTROL, Trigger.OSCILLATION) and self._recovered_at is not None:
-            if pose.distance_to(self._recovered_at) >= self._runtime.parameters.oscillation_distance:
-                self._reset_recovery()
-
-    def _reset_recovery(self) -> None:
-        self._next_behavior = 0
-        self._trigger = Trigger.NONE
-        self._recovered_at = None
 
     # -------------------------------------------------------------------------- new goal, cancel, pause
     def _take_offer(self) -> None:
         """Let a newer goal take over: a new plan is asked for, the robot drives on until it is there."""
         if not self._job.take_over(lambda handle: handle.on_wake(self.wake), PREEMPTED):
             return
-        self._reset_recovery()
-        self._monitor.restart(self._runtime.parameters.escalation_behaviors)
+        self._recoveries.restart()
         self._failure = None
         self._oscillation.reset()
         try:
@@ -343,7 +304,7 @@ class MoveBaseMachine:
 
     def _stop_then_recover(self, trigger: Trigger, failure: End) -> None:
         """Stop following; its end starts the recovery."""
-        self._trigger, self._failure = trigger, failure
+        self._failure = trigger, failure
         self._cancel_sub_goals(MoveBaseState.STOPPING)
         self._plan = None
 
@@ -356,7 +317,7 @@ class MoveBaseMachine:
     def _go_on_after_stop(self) -> End | None:
         """The robot stands: recover from what made it stop, or plan for a goal that took over meanwhile."""
         if self._failure is not None:
-            return self._recover_from(self._trigger, self._failure)
+            return self._recover_from(*self._failure)
         self._ask_for_plan()
         return None
 

@@ -1,18 +1,15 @@
 """The abstract navigation server: owns the runtime, the plugins and the six actions. It knows no map.
 
-A server of a map derives it and overrides hooks only: make the map, make a plugin's context, decide whether the map may
-be driven on, keep it alive while goals run, answer map queries. Examples: ``mbf_costmap_nav.server``,
+A server of a map overrides hooks only (``server.map_interface``): make the map, make a plugin's context, decide
+whether it may be driven on, keep it alive while goals run, answer map queries. Examples: ``mbf_costmap_nav.server``,
 ``mbf_mesh_nav.server``.
 """
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable
 from dataclasses import fields
-from pathlib import Path as FilePath
-from typing import Any, ClassVar
+from typing import Any
 
 from mbf_abstract.actions.exe_path import ExePathAction
 from mbf_abstract.actions.follow_waypoints import FollowWaypointsAction
@@ -32,18 +29,17 @@ from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.callbacks import CallbackThread
-from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.maps.view import FieldView, FloorMap, GridView, MapView, MeshView
-from mbf_abstract.parameters import ParameterModel, with_changes
-from mbf_abstract.plugins import ControlRequest, ControlResult, PlanRequest, PluginKind
-from mbf_abstract.server.plugin_host import PluginHost
+from mbf_abstract.parameters import with_changes
+from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
+from mbf_abstract.server.map_interface import MapInterface
+from mbf_abstract.server.plugin_notes import notes_on_plugins
 from mbf_abstract.server.process_end import ProcessEndWatch
 from mbf_abstract.time.clock import Clock
 from mbf_abstract.time.sim_clock import SimClock
 
 
-class AbstractNavigationServer(PluginHost):
+class AbstractNavigationServer(MapInterface):
     """Actions, plugins and the velocity gate of one robot; use it as a context manager or call ``close``.
 
     Parameters
@@ -66,11 +62,6 @@ class AbstractNavigationServer(PluginHost):
     scan_listeners : list of callables
         Called with every scan that comes, on its driver's thread, before the map takes it: must be short.
     """
-
-    config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {}
-    """Top-level blocks of a configuration that describe this server's map."""
-    map_names: ClassVar[Sequence[str]] = ()
-    """Names of the maps that a plugin can choose from, as in ``MapContext.maps``, of a server with several."""
 
     def __init__(
         self,
@@ -104,51 +95,6 @@ class AbstractNavigationServer(PluginHost):
         )
         self.follow_waypoints = FollowWaypointsAction(self.runtime, self.move_base)
 
-    # --------------------------------------------------------------------------- hooks for a map's server
-    @abstractmethod
-    def load_map(self, config: Config) -> None:
-        """Make the map from the configuration's sections; raises where its files are bad."""
-
-    @property
-    @abstractmethod
-    def queries(self) -> MapQueries:
-        """The map-independent questions, answered by this server's map."""
-
-    @abstractmethod
-    def take_scan(self, scan: RangeScan) -> None:
-        """Feed what a sensor saw into the map; in any known frame, raises TransformError where it is not known."""
-
-    def listens_to(self, source: str) -> bool:
-        """Whether scans of a source change the map; True of a server that does not know."""
-        return True
-
-    @classmethod
-    def config_for_map(cls, file: FilePath, unknown_is_free: bool = True) -> str | None:
-        """YAML text of a sane configuration for a bare map file; None if this server does not read such files.
-
-        ``unknown_is_free``: whether plans may lead over cells that the map does not know, where it has such.
-        """
-        return None
-
-    @classmethod
-    def read_floor(cls, file: FilePath) -> FloorMap | None:
-        """The floor that a map file describes; None if this server does not read such files, or maps have no cells.
-
-        Raises
-        ------
-        ConfigError
-            The file is damaged, or too large.
-        """
-        return None
-
-    ground_is_level: ClassVar[bool] = False
-    """Whether all ground is at height 0, so that a place needs no z."""
-
-    @property
-    def robot_radius(self) -> float:
-        """Radius [m] of a circle around the base that holds all of the robot; 0 of a server that does not know."""
-        return 0.0
-
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes for the user: what was left out of the configuration, and what the map server found."""
@@ -158,71 +104,7 @@ class AbstractNavigationServer(PluginHost):
         )
         kept = self.runtime.events.memory
         found = (str(event.data.get("message", "")) for event in (kept.of_kind(EventKind.MAP) if kept else ()))
-        return (*left_out, *found, *self._curve_notes(), *self._right_of_way_notes())
-
-    def _curve_notes(self) -> Iterator[str]:
-        """Plugins whose curves are tighter than the robot's."""
-        tightest = self.runtime.gate.limits.min_turning_radius
-        for kind in (PluginKind.PLANNER, PluginKind.CONTROLLER):
-            for plugin in self.plugins.all_of(kind):
-                name = f"{kind.name.lower()} {plugin.name!r}"
-                radius = getattr(plugin.instance.parameters, "min_turning_radius", None)
-                if radius is not None and 0.0 < radius < tightest:
-                    yield f"{name}: min_turning_radius {radius:g} m is tighter than the robot's {tightest:.2f} m"
-                if tightest > 0.0 and getattr(plugin.instance, "turns_on_the_spot", False):
-                    yield f"{name} turns on the spot, which the robot cannot: its tightest curve is {tightest:.2f} m"
-
-    def _right_of_way_notes(self) -> Iterator[str]:
-        """Whether robots meet that the behaviour for it does not see: both would pull out."""
-        parameters = self.runtime.parameters
-        name, distance = parameters.right_of_way_behavior, parameters.right_of_way_distance
-        plugin = self.plugins.find(PluginKind.RECOVERY, name) if name else None
-        seen = getattr(plugin.instance, "meeting_distance", distance) if plugin is not None else distance
-        if seen < distance:
-            yield (
-                f"right_of_way_distance {distance:g} m is more than the distance {seen:g} m of {name!r}: robots "
-                "that meet between the two all pull out"
-            )
-
-    def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
-        """Heights [m] of the ground at a place of the global frame, the best to stand on first; () without any."""
-        return (0.0,)
-
-    def ground_pose(self, x: float, y: float, yaw: float = 0.0) -> Pose:
-        """Pose on the ground in the global frame: on the lowest free storey, at height 0 where there is no ground."""
-        heights = self.ground_heights(x, y)
-        return Pose.planar(x, y, yaw, heights[0] if heights else 0.0, frame_id=self.config.parameters.global_frame)
-
-    map_view_type: ClassVar[type[GridView] | type[MeshView] | None] = None
-    """What all of ``map_views`` look like; None if this server has nothing to show."""
-
-    @property
-    def map_views(self) -> tuple[str, ...]:
-        """Names of what ``map_view`` can show: maps or layers, the one planners see first."""
-        return ()
-
-    def map_view(self, name: str = "") -> MapView | None:
-        """What the map, or one of ``map_views``, looks like; None if this server has nothing to show."""
-        return None
-
-    def field_view(self, path: Path) -> FieldView | None:
-        """Directions that a planner has found together with a path; None where it has only found the path."""
-        return None
-
-    def map_problem(self) -> str:
-        """Why the map must not be driven on right now; empty = it is current."""
-        return ""
-
-    def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
-        """The answer of a controller with a command by which the robot touches nothing that moves; as it is here."""
-        return answer
-
-    def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
-        """Keep the map alive while a goal of this kind runs."""
-        return nullcontext()
-
-    def close_map(self) -> None:
-        """Give back what the map holds; called once, after all goals were canceled."""
+        return (*left_out, *found, *notes_on_plugins(self.plugins, self.runtime))
 
     # --------------------------------------------------------------------------------------- parameters
     def set_parameters(self, **changes: Any) -> None:

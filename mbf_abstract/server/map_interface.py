@@ -1,0 +1,123 @@
+"""What a server asks of its map: hooks that the server of a map overrides, with answers for a server that has none.
+
+A backend on layered maps derives ``server.map_server.MapServer``, which answers most of them once for every backend.
+When to read this: writing a server for a map of another kind. When not: writing planners, controllers, layers; they
+see the map that ``make_context`` hands them.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path as FilePath
+from typing import ClassVar
+
+from mbf_abstract.config.configuration import Config
+from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.maps.map_queries import MapQueries
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.view import FieldView, FloorMap, GridView, MapView, MeshView
+from mbf_abstract.parameters import ParameterModel
+from mbf_abstract.plugins import ControlResult, PluginKind
+from mbf_abstract.server.plugin_host import PluginHost
+
+
+class MapInterface(PluginHost):
+    """The questions about the map, for a server to answer.
+
+    Attributes
+    ----------
+    config : Config
+        The validated configuration.
+    """
+
+    config: Config
+    config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {}
+    """Top-level blocks of a configuration that describe this server's map."""
+    map_names: ClassVar[Sequence[str]] = ()
+    """Names of the maps that a plugin can choose from, as in ``MapContext.maps``, of a server with several."""
+
+    @abstractmethod
+    def load_map(self, config: Config) -> None:
+        """Make the map from the configuration's sections; raises where its files are bad."""
+
+    @property
+    @abstractmethod
+    def queries(self) -> MapQueries:
+        """The map-independent questions, answered by this server's map."""
+
+    @abstractmethod
+    def take_scan(self, scan: RangeScan) -> None:
+        """Feed what a sensor saw into the map; in any known frame, raises TransformError where it is not known."""
+
+    def listens_to(self, source: str) -> bool:
+        """Whether scans of a source change the map; True of a server that does not know."""
+        return True
+
+    @classmethod
+    def config_for_map(cls, file: FilePath, unknown_is_free: bool = True) -> str | None:
+        """YAML text of a sane configuration for a bare map file; None if this server does not read such files.
+
+        ``unknown_is_free``: whether plans may lead over cells that the map does not know, where it has such.
+        """
+        return None
+
+    @classmethod
+    def read_floor(cls, file: FilePath) -> FloorMap | None:
+        """The floor that a map file describes; None if this server does not read such files, or maps have no cells.
+
+        Raises
+        ------
+        ConfigError
+            The file is damaged, or too large.
+        """
+        return None
+
+    ground_is_level: ClassVar[bool] = False
+    """Whether all ground is at height 0, so that a place needs no z."""
+
+    @property
+    def robot_radius(self) -> float:
+        """Radius [m] of a circle around the base that holds all of the robot; 0 of a server that does not know."""
+        return 0.0
+
+    def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
+        """Heights [m] of the ground at a place of the global frame, the best to stand on first; () without any."""
+        return (0.0,)
+
+    def ground_pose(self, x: float, y: float, yaw: float = 0.0) -> Pose:
+        """Pose on the ground in the global frame: on the lowest free storey, at height 0 where there is no ground."""
+        heights = self.ground_heights(x, y)
+        return Pose.planar(x, y, yaw, heights[0] if heights else 0.0, frame_id=self.config.parameters.global_frame)
+
+    map_view_type: ClassVar[type[GridView] | type[MeshView] | None] = None
+    """What all of ``map_views`` look like; None if this server has nothing to show."""
+
+    @property
+    def map_views(self) -> tuple[str, ...]:
+        """Names of what ``map_view`` can show: maps or layers, the one planners see first."""
+        return ()
+
+    def map_view(self, name: str = "") -> MapView | None:
+        """What the map, or one of ``map_views``, looks like; None if this server has nothing to show."""
+        return None
+
+    def field_view(self, path: Path) -> FieldView | None:
+        """Directions that a planner has found together with a path; None where it has only found the path."""
+        return None
+
+    def map_problem(self) -> str:
+        """Why the map must not be driven on right now; empty = it is current."""
+        return ""
+
+    def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
+        """The answer of a controller with a command by which the robot touches nothing that moves; as it is here."""
+        return answer
+
+    def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
+        """Keep the map alive while a goal of this kind runs."""
+        return nullcontext()
+
+    def close_map(self) -> None:
+        """Give back what the map holds; called once, after all goals were canceled."""

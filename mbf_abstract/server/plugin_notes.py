@@ -1,0 +1,39 @@
+"""Settings of plugins that do not fit the robot or the server: each note is a sentence for the user."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.plugins import PluginKind
+from mbf_abstract.server.plugin_table import PluginTable
+
+
+def notes_on_plugins(plugins: PluginTable, runtime: Runtime) -> Iterator[str]:
+    """Yield a note for every setting that can not work as it is."""
+    yield from _curve_notes(plugins, runtime.gate.limits.min_turning_radius)
+    yield from _right_of_way_notes(plugins, runtime)
+
+
+def _curve_notes(plugins: PluginTable, tightest: float) -> Iterator[str]:
+    """Plugins whose curves are tighter than the robot's radius [m]."""
+    for kind in (PluginKind.PLANNER, PluginKind.CONTROLLER):
+        for plugin in plugins.all_of(kind):
+            name = f"{kind.name.lower()} {plugin.name!r}"
+            radius = getattr(plugin.instance.parameters, "min_turning_radius", None)
+            if radius is not None and 0.0 < radius < tightest:
+                yield f"{name}: min_turning_radius {radius:g} m is tighter than the robot's {tightest:.2f} m"
+            if tightest > 0.0 and getattr(plugin.instance, "turns_on_the_spot", False):
+                yield f"{name} turns on the spot, which the robot cannot: its tightest curve is {tightest:.2f} m"
+
+
+def _right_of_way_notes(plugins: PluginTable, runtime: Runtime) -> Iterator[str]:
+    """Whether robots meet that the behaviour for it does not see: both would pull out."""
+    name, distance = runtime.parameters.right_of_way_behavior, runtime.parameters.right_of_way_distance
+    plugin = plugins.find(PluginKind.RECOVERY, name) if name else None
+    seen = getattr(plugin.instance, "meeting_distance", distance) if plugin is not None else distance
+    if seen < distance:
+        yield (
+            f"right_of_way_distance {distance:g} m is more than the distance {seen:g} m of {name!r}: robots "
+            "that meet between the two all pull out"
+        )
