@@ -20,8 +20,8 @@ cancel                  cancel the sub-goals, wait for their ends, end CANCELED
 
 A robot that is stuck (failures of one kind at one place, again and again) gets the behaviours of
 ``escalation_behaviors`` instead of those of the list, and so does one whose list is used up; see
-``actions.stuck_monitor``. One that is blocked where it meets robots that announce their ways runs
-``right_of_way_behavior`` first. By default there are none of these, and the machine is that of Move Base Flex.
+``actions.stuck_monitor``. One that is blocked where it meets robots that announce their ways runs the behaviour for
+``actions.meetings`` first. Without an escalation and alone, the machine is that of Move Base Flex.
 
 Each behaviour of the list runs at most once until the list is reset: by a plan after trigger *plan*, by
 ``oscillation_distance`` of motion after the other two (upstream forgets that for *control*).
@@ -34,6 +34,7 @@ from typing import Any
 from mbf_abstract.actions.action import Action, GoalJob
 from mbf_abstract.actions.exe_path import ExePathAction
 from mbf_abstract.actions.get_path import GetPathAction
+from mbf_abstract.actions.meetings import behavior_for_meetings
 from mbf_abstract.actions.move_base_machine import MoveBaseMachine, SubActions
 from mbf_abstract.actions.recovery import RecoveryAction
 from mbf_abstract.actions.refine_path import RefinePathAction
@@ -78,7 +79,7 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
         wanted = [(PluginKind.PLANNER, goal.planner), (PluginKind.CONTROLLER, goal.controller)]
         parameters = self.runtime.parameters
         behaviors = [*(goal.recovery_behaviors or ()), *parameters.escalation_behaviors]
-        behaviors += [parameters.right_of_way_behavior] if parameters.right_of_way_behavior else []
+        behaviors += filter(None, [behavior_for_meetings(self.runtime, self._plugins)])
         wanted += [(PluginKind.RECOVERY, name) for name in behaviors]
         if refiner := parameters.plan_refiner:
             wanted.append((PluginKind.REFINER, refiner))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from mbf_abstract.actions.meetings import behavior_for_meetings
 from mbf_abstract.actions.move_base_states import Trigger
 from mbf_abstract.actions.stuck_monitor import StuckMonitor
 from mbf_abstract.drive.robot import RobotStateError
@@ -24,7 +25,7 @@ class RecoverySequence:
     def __init__(self, runtime: Runtime, plugins: PluginTable) -> None:
         self._runtime = runtime
         self._plugins = plugins
-        self._monitor = StuckMonitor(runtime)
+        self._monitor = StuckMonitor(runtime, plugins)
         self._next = 0
         self._trigger = Trigger.NONE
         self._recovered_at: Pose | None = None
@@ -76,8 +77,8 @@ class RecoverySequence:
         return self._monitor.described(failure)
 
     def _all_loaded(self) -> list[str]:
-        parameters = self._runtime.parameters
-        kept_back = {*parameters.escalation_behaviors, parameters.right_of_way_behavior}
+        for_meetings = behavior_for_meetings(self._runtime, self._plugins)
+        kept_back = {*self._runtime.parameters.escalation_behaviors, for_meetings}
         return [name for name in self._plugins.names(PluginKind.RECOVERY) if name not in kept_back]
 
     def _start_list_again(self) -> None:

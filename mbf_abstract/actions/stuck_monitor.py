@@ -5,9 +5,9 @@ An executive notes every failure it recovers from and every behaviour it has run
 the monitor emits an event, and the behaviours of ``escalation_behaviors`` are due, one after the other. Each runs once
 at a place; then there is nothing left to try, and ``described`` gives the text with which the executive gives up.
 
-Where a robot is blocked and meets robots that announce their ways (``mbf_abstract.traffic``), ``right_of_way_behavior``
-is due at the first failure: what clears maps or backs up takes time, and the others do not know of it. It runs
-``MOST_MEETINGS`` times at a place at most.
+Where a robot is blocked and meets robots that announce their ways (``mbf_abstract.traffic``), the behaviour for
+``meetings`` is due at the first failure: what clears maps or backs up takes time, and the others do not know of it. It
+runs ``MOST_MEETINGS`` times at a place at most.
 
 When to use: one monitor for each goal of an executive of your own; ``move_base`` and the missions of behaviour trees
 have one. When not: a robot that moves without getting anywhere raises no failure; the oscillation and progress watches
@@ -22,11 +22,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from mbf_abstract.actions.meetings import behavior_for_meetings, meeting_distance
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, is_success, outcome_name
+from mbf_abstract.server.plugin_table import PluginTable
 from mbf_abstract.traffic.right_of_way import MEETING_LENGTH
 
 TIME_RESOLUTION = 1e-9  # s
@@ -86,8 +88,8 @@ class TroubleSpot:
 class StuckMonitor:
     """The trouble of one goal at a time; used by one thread."""
 
-    def __init__(self, runtime: Runtime) -> None:
-        self._runtime = runtime
+    def __init__(self, runtime: Runtime, plugins: PluginTable) -> None:
+        self._runtime, self._plugins = runtime, plugins
         self.restart()
 
     def restart(self, escalation: Sequence[str] = ()) -> None:
@@ -101,12 +103,12 @@ class StuckMonitor:
         self._escalation = tuple(escalation)
         self._spots: list[TroubleSpot] = []
         self._present: TroubleSpot | None = None
-        self._meets = False
+        self._for_meeting = ""  # the behaviour that is due because the robot meets others
 
     # ------------------------------------------------------------------------------------------- what happened
     def note_failure(self, outcome: int) -> None:
         """Count a failure where the robot is now; one of a robot that does not know where it is belongs nowhere."""
-        self._meets = False
+        self._for_meeting = ""
         try:
             pose = self._runtime.robot.pose()
         except RobotStateError:
@@ -115,7 +117,8 @@ class StuckMonitor:
         self._present = spot = self._spot_at(pose)
         was_stuck = self._is_too_much(spot.failures.setdefault(outcome, []))
         spot.failures[outcome].append(self._runtime.clock.now())
-        self._meets = outcome in BLOCKED and spot.meetings < MOST_MEETINGS and self._meets_others()
+        if outcome in BLOCKED and spot.meetings < MOST_MEETINGS and self._meets_others():
+            self._for_meeting = behavior_for_meetings(self._runtime, self._plugins)
         if self._is_too_much(spot.failures[outcome]) and not was_stuck:
             self._runtime.events.emit(
                 EventKind.STUCK,
@@ -128,11 +131,9 @@ class StuckMonitor:
             )
 
     def _meets_others(self) -> bool:
-        """Whether there is a behaviour for robots that announce their ways, and the robot meets such robots."""
-        parameters, now = self._runtime.parameters, self._runtime.clock.now()
-        if not parameters.right_of_way_behavior:
-            return False
-        return bool(self._runtime.traffic.rivals(now, parameters.right_of_way_distance, MEETING_LENGTH))
+        """Whether the robot meets robots that announce their ways."""
+        distance = meeting_distance(self._runtime, self._plugins)
+        return bool(self._runtime.traffic.rivals(self._runtime.clock.now(), distance, MEETING_LENGTH))
 
     def _is_too_much(self, times: Sequence[float]) -> bool:
         """Whether failures of one kind at one place, at these times [s], mean that the robot is stuck."""
@@ -163,7 +164,7 @@ class StuckMonitor:
     @property
     def escalates(self) -> bool:
         """Whether right of way or escalation decide what happens next, instead of the usual recoveries."""
-        return self._meets or (self.stuck and bool(self._escalation))
+        return bool(self._for_meeting) or (self.stuck and bool(self._escalation))
 
     def next_behavior(self) -> str:
         """Return the one for the right of way, if it is due, else the next one of the escalation at the present place.
@@ -171,10 +172,10 @@ class StuckMonitor:
         Empty if all have run here.
         """
         spot = self._present
-        if spot is not None and self._meets:
-            self._meets = False
+        if spot is not None and self._for_meeting:
+            behavior, self._for_meeting = self._for_meeting, ""
             spot.meetings += 1
-            return self._runtime.parameters.right_of_way_behavior
+            return behavior
         if spot is None or spot.escalations >= len(self._escalation):
             return ""
         spot.escalations += 1

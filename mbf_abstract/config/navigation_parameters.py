@@ -126,13 +126,19 @@ class NavigationParameters(ParameterModel):
         "navigation tree give up. They are not among those that move_base runs by default. Empty = no escalation, as "
         "in Move Base Flex.",
     )
-    right_of_way_behavior: str = parameter(
-        "",
+    right_of_way_behavior: str | None = parameter(
+        None,
         "Recovery behaviour of a robot that is blocked where it meets robots that announce their ways, before any "
-        "other, such as a give_way. It is not among those that move_base runs by default. Empty = none.",
+        "other. It is then not among those that move_base runs by default. Empty = none; absent = the one named "
+        "give_way, of a robot that has loaded it and announces its own way.",
     )
-    right_of_way_distance: float = parameter(
-        0.8, "Two robots meet where their ways come nearer to each other than this.", unit="m", gt=0.0, le=5.0
+    right_of_way_distance: float | None = parameter(
+        None,
+        "Two robots meet where their ways come nearer to each other than this; absent = the distance of the behaviour, "
+        "or 0.8 m where it has none.",
+        unit="m",
+        gt=0.0,
+        le=5.0,
     )
 
     # Robot, frames and odometry

@@ -57,7 +57,8 @@ class MissionContext:
     _handles: list[AnyGoalHandle] = field(default_factory=list, repr=False)
 
     def __post_init__(self) -> None:
-        self.stuck = StuckMonitor(self.navigator.server.runtime)
+        server = self.navigator.server
+        self.stuck = StuckMonitor(server.runtime, server.plugins)
 
     @property
     def clock(self) -> Clock:

@@ -96,7 +96,7 @@ class MoveBaseGoal:
     ----------
     recovery_behaviors : tuple of str, optional
         Names to try in order; None = all that are loaded, in load order, but for those of ``escalation_behaviors``
-        and ``right_of_way_behavior``; empty = none.
+        and the one that is run where robots meet, see ``right_of_way_behavior``; empty = none.
     dist_tolerance, angle_tolerance : float, optional
         Arrival tolerances [m, rad], None = the server's. Where the target cannot be reached, the path may end that far
         from it too; the robot then comes the nearer to the path's end, at least to a quarter of the tolerance.

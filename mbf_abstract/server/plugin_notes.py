@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from mbf_abstract.actions.meetings import own_distance
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.plugin_table import PluginTable
@@ -29,11 +30,9 @@ def _curve_notes(plugins: PluginTable, tightest: float) -> Iterator[str]:
 
 def _right_of_way_notes(plugins: PluginTable, runtime: Runtime) -> Iterator[str]:
     """Whether robots meet that the behaviour for it does not see: both would pull out."""
-    name, distance = runtime.parameters.right_of_way_behavior, runtime.parameters.right_of_way_distance
-    plugin = plugins.find(PluginKind.RECOVERY, name) if name else None
-    seen = getattr(plugin.instance, "meeting_distance", distance) if plugin is not None else distance
-    if seen < distance:
+    distance, seen = runtime.parameters.right_of_way_distance, own_distance(runtime, plugins)
+    if distance is not None and seen is not None and seen < distance:
         yield (
-            f"right_of_way_distance {distance:g} m is more than the distance {seen:g} m of {name!r}: robots "
-            "that meet between the two all pull out"
+            f"right_of_way_distance {distance:g} m is more than the distance {seen:g} m of the behaviour that is "
+            "run for it: robots that meet between the two all pull out"
         )

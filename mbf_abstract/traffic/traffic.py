@@ -117,6 +117,11 @@ class Traffic:
         """Announce under a name of its own, on a channel."""
         self._name, self._channel = name, channel
 
+    @property
+    def connected(self) -> bool:
+        """Whether the robot announces itself."""
+        return self._channel is not None
+
     def announce(self, announcement: Announcement, destination: FloatArray | None = None) -> None:
         """Publish where the robot is, and look who else has announced something.
 

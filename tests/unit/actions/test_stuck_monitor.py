@@ -19,7 +19,7 @@ class Stand:
 
     def __init__(self, session, escalation=()):
         self.session = session
-        self.monitor = StuckMonitor(session.server.runtime)
+        self.monitor = StuckMonitor(session.server.runtime, session.server.plugins)
         self.monitor.restart(escalation)
 
     def fail(self, x=0.0, outcome=BLOCKED):

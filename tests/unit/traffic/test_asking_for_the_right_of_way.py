@@ -11,13 +11,14 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
-from mbf_abstract.plugins import ControlResult, PlanResult
+from mbf_abstract.plugins import ControlResult, PlanResult, PluginKind
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.traffic import SharedChannel
 
-RECOVERIES = ("clear", "back_up", "give_way")
+USUAL = {"clear": ScriptedRecovery, "back_up": ScriptedRecovery}
+RECOVERIES = USUAL | {"give_way": ScriptedRecovery}
 GOAL = Pose.planar(2.0, 0.0)
 BLOCKED = ControlResult(ExePathOutcome.BLOCKED_PATH, "a robot ahead")
 STAMP = 0.0  # s; a robot is heard of for 3 s from the first look, longer than these tests meet it
@@ -43,16 +44,17 @@ def make_session():
     """Make sessions of a robot at the origin that announces that it goes along x; all are closed at the end."""
     sessions = []
 
-    def make(*others, **parameters):
+    def make(*others, recoveries=RECOVERIES, announces=True, **parameters):
         plugins = {"planner": ScriptedPlanner, "controller": ScriptedController}
-        asked = {"right_of_way_behavior": "give_way", "planner_max_retries": 0, "controller_max_retries": 0}
-        session = ScriptedSession(plugins | dict.fromkeys(RECOVERIES, ScriptedRecovery), **asked | parameters)
+        asked = {"planner_max_retries": 0, "controller_max_retries": 0}
+        session = ScriptedSession(plugins | recoveries, **asked | parameters)
         sessions.append(session)
-        traffic, channel = session.server.runtime.traffic, SharedChannel()
-        traffic.connect("anna", channel)
-        traffic.announce(robot("", 0.0, 2.0))
-        for other in others:
-            channel.publish(other)
+        if announces:
+            traffic, channel = session.server.runtime.traffic, SharedChannel()
+            traffic.connect("anna", channel)
+            traffic.announce(robot("", 0.0, 2.0))
+            for other in others:
+                channel.publish(other)
         return session
 
     yield make
@@ -158,6 +160,43 @@ def test_it_is_none_of_the_recoveries_that_move_base_runs_by_default(make_sessio
     assert recoveries(session) == ["clear", "back_up"]
 
 
+def test_a_robot_that_announces_nothing_runs_it_like_any_other_recovery(make_session):
+    session = make_session(announces=False)
+    session.controller.play(BLOCKED, BLOCKED, BLOCKED, BLOCKED)
+    assert not session.navigator.send(MoveBaseGoal(GOAL)).wait().success
+    assert recoveries(session) == list(RECOVERIES)
+
+
+def test_without_a_recovery_of_that_name_the_usual_ones_are_run(make_session, run):
+    session = make_session(HEAD_ON, recoveries=USUAL)
+    session.controller.play(BLOCKED, session.controller.follow)
+    assert run(session).success
+    assert recoveries(session) == ["clear"]
+
+
+def test_another_behaviour_can_be_named_for_it(make_session, run):
+    session = make_session(
+        HEAD_ON, recoveries=RECOVERIES | {"step_aside": ScriptedRecovery}, right_of_way_behavior="step_aside"
+    )
+    session.controller.play(BLOCKED, session.controller.follow)
+    assert run(session).success
+    assert recoveries(session) == ["step_aside"]
+
+
+def test_one_that_is_quarantined_refuses_no_goal_unless_it_is_named(make_session):
+    for named, refused in ((None, False), ("give_way", True)):
+        session = make_session(HEAD_ON, right_of_way_behavior=named)
+        plugin = session.server.plugins.find(PluginKind.RECOVERY, "give_way")
+        user = object()
+        assert plugin.acquire(user, lambda: True)
+        plugin.quarantine(user, "it hangs")
+        session.controller.play(BLOCKED, session.controller.follow)
+        handle = session.navigator.send(MoveBaseGoal(GOAL, recovery_behaviors=("clear",)))
+        assert (handle.status is GoalStatus.REJECTED) == refused
+        assert handle.wait().success != refused
+        assert recoveries(session) == ([] if refused else ["clear"])
+
+
 def test_a_behaviour_that_is_not_loaded_refuses_a_goal_of_move_base(make_session):
     session = make_session(right_of_way_behavior="step_aside")
     handle = session.navigator.send(MoveBaseGoal(GOAL))
@@ -171,12 +210,20 @@ class ShortSighted(ScriptedRecovery):
     meeting_distance = 0.6
 
 
-@pytest.mark.parametrize(("distance", "noted"), [(0.6, False), (0.8, True)])
+@pytest.mark.parametrize(("distance", "noted"), [(None, False), (0.6, False), (0.8, True)])
 def test_a_behaviour_that_sees_less_than_what_it_is_asked_for_is_noted(distance, noted):
     plugins = {"planner": ScriptedPlanner, "give_way": ShortSighted}
-    with ScriptedSession(plugins, right_of_way_behavior="give_way", right_of_way_distance=distance) as session:
-        text = "right_of_way_distance 0.8 m is more than the distance 0.6 m of 'give_way'"
+    with ScriptedSession(plugins, right_of_way_distance=distance) as session:
+        text = "right_of_way_distance 0.8 m is more than the distance 0.6 m of the behaviour that is run for it"
         assert [text in note for note in session.server.notes] == [True] * noted
+
+
+@pytest.mark.parametrize(("y", "expected"), [(0.5, "give_way"), (0.7, "clear")])
+def test_robots_meet_at_the_distance_from_which_the_behaviour_sees_others(make_session, run, y, expected):
+    session = make_session(robot("ben", 4.0, -4.0, y=y), recoveries=USUAL | {"give_way": ShortSighted})
+    session.controller.play(BLOCKED, session.controller.follow)
+    assert run(session).success
+    assert recoveries(session) == [expected]
 
 
 def test_where_recovery_is_off_move_base_does_not_ask(make_session):
