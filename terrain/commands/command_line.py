@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -33,5 +34,6 @@ def _words(parameter: Any, value: Any) -> list[str]:
 
 
 def _without_folders(value: Any) -> str:
+    value = value.value if isinstance(value, Enum) else value
     key, equals, text = str(value).rpartition("=")
     return f"{key}{equals}{Path(text).name if Path(text).is_absolute() else text}"

@@ -1,12 +1,10 @@
-"""The commands ``mbf bench outdoor`` and ``mbf bench indoor``."""
+"""The commands ``mbf bench outdoor``, ``indoor`` and ``moving``."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -14,12 +12,9 @@ from mbf_abstract.commands.reporting import readable_errors
 from terrain.commands.command_line import command_line
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from terrain.experiments.evaluation.protocol import Entry, Protocol
+    from terrain.experiments.evaluation.bench import Asked
 
 QUICK_SEEDS = "0:1"
-ALL_SHIPPED = "all"
 MOST_LEVELS = 10
 
 PLANNER = typer.Option("", "--planner", help="Planner to judge: a type, module:Class or an installed plugin's name.")
@@ -41,25 +36,18 @@ TIME_LIMIT = typer.Option(
 AS_JSON = typer.Option(False, "--json", help="Print one JSON object instead of the table.")
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What the command line asks for; see the options."""
+class People(str, Enum):
+    """Part of the moving evaluation."""
 
-    settings: dict[str, str]
-    backend: str
-    name: str
-    beside: Sequence[str]
-    workers: int
-    time_limit: float
-    as_json: bool
-    out: Path
-    command: str
+    YIELDING = "yielding"
+    BLIND = "blind"
 
 
 def register(bench: typer.Typer) -> None:
     """Add the commands to the group ``mbf bench``."""
     bench.command("outdoor")(outdoor)
     bench.command("indoor")(indoor)
+    bench.command("moving")(moving)
 
 
 def outdoor(
@@ -86,9 +74,10 @@ def outdoor(
     """Judge your planner or controller on rough ground, beside the shipped ones."""
     asked = _asked(context, planner, controller, settings, backend, name, beside, workers, time_limit, as_json, out)
     with readable_errors():
+        from terrain.experiments.evaluation.bench import bench
         from terrain.experiments.evaluation.outdoor import outdoor as protocol
 
-        _bench(protocol(_seeds(seeds, quick), _levels(levels), surveys), asked)
+        bench(protocol(_seeds(seeds, quick), _levels(levels), surveys), asked)
 
 
 def indoor(
@@ -112,9 +101,40 @@ def indoor(
     """Judge your planner or controller among posts that only a lidar sees, beside the shipped ones."""
     asked = _asked(context, planner, controller, settings, backend, name, beside, workers, time_limit, as_json, out)
     with readable_errors():
+        from terrain.experiments.evaluation.bench import bench
         from terrain.experiments.evaluation.indoor import indoor as protocol
 
-        _bench(protocol(_seeds(seeds, quick), _levels(levels)), asked)
+        bench(protocol(_seeds(seeds, quick), _levels(levels)), asked)
+
+
+def moving(
+    context: typer.Context,
+    planner: str = PLANNER,
+    controller: str = CONTROLLER,
+    backend: str = typer.Option("costmap", "--backend", help="Map of your entry: costmap or mesh."),
+    name: str = NAME,
+    settings: list[str] = SETTINGS,
+    beside: list[str] = BESIDE,
+    seeds: str = SEEDS,
+    levels: str = LEVELS,
+    quick: bool = QUICK,
+    people: People = typer.Option(
+        People.YIELDING, "--people", help="People who yield, or blind ones; a table of its own for each."
+    ),
+    workers: int = WORKERS,
+    time_limit: float = TIME_LIMIT,
+    as_json: bool = AS_JSON,
+    out: Path = typer.Option(
+        Path("runs/bench_moving"), "--out", help="Folder for results; runs that it holds are kept."
+    ),
+) -> None:
+    """Judge your planner or controller among people who walk, beside the shipped ones."""
+    asked = _asked(context, planner, controller, settings, backend, name, beside, workers, time_limit, as_json, out)
+    with readable_errors():
+        from terrain.experiments.evaluation.bench import bench
+        from terrain.experiments.evaluation.moving import moving as protocol
+
+        bench(protocol(_seeds(seeds, quick), _levels(levels), people.value), asked)
 
 
 def _seeds(text: str, quick: bool) -> list[int]:
@@ -146,93 +166,9 @@ def _asked(
     out: Path,
 ) -> Asked:
     from terrain.commands.run import settings_of
+    from terrain.experiments.evaluation.bench import Asked
 
     chosen = settings_of(settings, planner=planner, controller=controller)
     if not chosen and not beside:
         raise typer.BadParameter("nothing to judge: give --planner, --controller, --set or --beside")
     return Asked(chosen, backend, name, beside, workers, time_limit, as_json, out, command_line(context))
-
-
-def _bench(protocol: Protocol, asked: Asked) -> None:
-    """Drive everything, and write and print the results."""
-    from rich.console import Console
-
-    from mbf_abstract.event_values import well_formed
-    from mbf_abstract.whole_files import write_whole
-    from terrain.experiments.evaluation.joining import join
-    from terrain.experiments.evaluation.leaderboard import page, settings_text, standings, terminal_table
-    from terrain.experiments.evaluation.results import (
-        described,
-        read_results,
-        results_of,
-        shipped_results,
-        write_results,
-    )
-    from terrain.experiments.evaluation.trials import run_trials
-
-    console = Console(stderr=asked.as_json)
-    entries = _entries(protocol, asked)
-    others = {name: read_results(Path(name)) for name in asked.beside if _is_file(name)}
-    if (shipped := shipped_results(protocol)) is not None:
-        others["the shipped results"] = shipped
-    rows = run_trials(protocol, entries, asked.out, asked.workers, asked.time_limit, _reporter(console))
-    results = results_of(protocol, entries, rows, asked.command)
-    asked.out.mkdir(parents=True, exist_ok=True)
-    write_results(results, asked.out / "results.json")
-    table = join(results, others, protocol)
-    lines = standings(table.rows, len(protocol.trials))
-    title = f"mbf bench {protocol.name} {protocol.version}"
-    own = {entry.name for entry in entries if entry.name not in protocol.entries}
-    about = [*_about(results.head), *table.origins]
-    write_whole(asked.out / "leaderboard.html", page(title, about, table.rows, lines, own, table.entries))
-    if asked.as_json:
-        typer.echo(json.dumps({**results.head, "standings": [vars(line) for line in lines]}))
-        return
-    console.print(terminal_table(lines, f"{title}, {len(protocol.trials)} worlds, protocol {protocol.hash}"))
-    known = {name: described(entry) for name, entry in protocol.entries.items()}
-    for name, entry in table.entries.items():
-        if known.get(name) != entry:
-            text = f"{name}: {entry['backend']}, {settings_text(entry)}"
-            console.print(well_formed(text), markup=False, highlight=False, soft_wrap=True)
-    for line in lines:
-        if line.entry in own and line.reason:
-            text = f"{line.entry} fails most often with: {line.reason}"
-            console.print(well_formed(text), markup=False, highlight=False, soft_wrap=True)
-    console.print(f"results in {asked.out}: results.json, leaderboard.html", markup=False, soft_wrap=True)
-
-
-def _entries(protocol: Protocol, asked: Asked) -> list[Entry]:
-    """The user's entry, and the shipped ones that are driven too, each once."""
-    from terrain.experiments.evaluation.entrant import entrant
-
-    names = [name for name in asked.beside if not _is_file(name)]
-    chosen = list(protocol.entries) if ALL_SHIPPED in names else list(dict.fromkeys(names))
-    own = [entrant(protocol, asked.settings, asked.backend, asked.name)] if asked.settings else []
-    return [*own, *(protocol.entry(name) for name in chosen)]
-
-
-def _is_file(name: str) -> bool:
-    return name.endswith(".json")
-
-
-def _reporter(console: Console) -> Callable[[dict[str, Any]], None]:
-    from mbf_abstract.event_values import well_formed
-    from terrain.commands.verdict_line import TERMINAL_COLOURS
-    from terrain.recording.verdict import Level
-
-    def report(row: dict[str, Any]) -> None:
-        text = well_formed(f"{row['entry']}, {row['world']}, seed {row['seed']}: {row['verdict']}")
-        style = TERMINAL_COLOURS[Level(row["level"])]
-        console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
-
-    return report
-
-
-def _about(head: dict[str, Any]) -> list[str]:
-    protocol = head["protocol"]
-    return [
-        f"{protocol['about']} {protocol['trials']} worlds; protocol {protocol['version']}, hash {protocol['hash']}.",
-        f"A success: {protocol['rules']['success']}. Rates are over the worlds that have a route by the judge. Ranked "
-        "by successes, then by SPL (success weighted by path length); who did not drive all worlds has no rank.",
-        f"Driven with: {head['command']} (mbf-flex {head['version']}).",
-    ]

@@ -43,6 +43,8 @@ class Standing:
     time_s, planning_ms : float or None
         Medians: of the successes, and of all runs.
     arrived_without_route : int
+    contacts, near_misses : int or None
+        Sums of contacts in which the robot moved, and of near misses; None where a run has no such numbers.
     failures : dict of str to int
         In worlds with a route, by class.
     reason : str
@@ -61,6 +63,8 @@ class Standing:
     time_s: float | None
     planning_ms: float | None
     arrived_without_route: int
+    contacts: int | None
+    near_misses: int | None
     failures: dict[str, int]
     reason: str
 
@@ -107,18 +111,30 @@ def _standing(name: str, rows: Sequence[Row]) -> Standing:
         round(float(np.median(times)), 3) if times else None,
         round(float(np.median(planning)), 3) if planning else None,
         sum(bool(row["success"]) for row in rows if not row["route"]),
+        _sum(rows, "collisions_while_moving"),
+        _sum(rows, "near_misses"),
         dict(sorted(Counter(row["failure"] for row in failed).items())),
         messages.most_common(1)[0][0] if messages else "",
     )
+
+
+def _sum(rows: Sequence[Row], name: str) -> int | None:
+    """Over the runs that began; None if one of them has no such number, as in results of older versions."""
+    counts = [row.get(name) for row in rows if row["failure"] != "error"]
+    known = [count for count in counts if count is not None]
+    return sum(known) if len(known) == len(counts) else None
 
 
 def terminal_table(lines: Sequence[Standing], title: str) -> Table:
     """Return the leaderboard for a terminal of 80 columns."""
     table = Table(box=SIMPLE, title=escape(title), title_justify="left")
     table.add_column("", justify="right")
-    table.add_column("entry", overflow="fold")
-    for name in ("arrived", "SPL", "time\n[s]", "planning\n[ms]"):
+    table.add_column("entry", overflow="fold", min_width=13)
+    for name in ("arrived", "SPL", "time\n[s]", "plan\n[ms]"):
         table.add_column(escape(name), justify="right")
+    counts = _counts(lines)
+    for name in counts:
+        table.add_column(name.replace(" ", "\n"), justify="right")
     table.add_column("failures", overflow="fold")
     for line in lines:
         table.add_row(
@@ -128,9 +144,16 @@ def terminal_table(lines: Sequence[Standing], title: str) -> Table:
             f"{line.spl:.3f}",
             "-" if line.time_s is None else f"{line.time_s:.1f}",
             "-" if line.planning_ms is None else f"{line.planning_ms:.1f}",
+            *("-" if count is None else str(count) for count in (getattr(line, key) for key in counts.values())),
             escape(failures_text(line)),
         )
     return table
+
+
+def _counts(lines: Sequence[Standing]) -> dict[str, str]:
+    """Headings and attributes of the counts that are not 0, or unknown, in every line."""
+    names = {"contacts": "contacts", "near misses": "near_misses"}
+    return {title: name for title, name in names.items() if any(getattr(line, name) for line in lines)}
 
 
 def failures_text(line: Standing) -> str:
@@ -158,7 +181,7 @@ def page(
         Map and settings of every line.
     """
     parts = [f"<p>{html.escape(text)}</p>" for text in about]
-    parts += [html_table([_page_line(line, line.entry in entrants) for line in lines])]
+    parts += [html_table([_page_line(line, line.entry in entrants, _counts(lines)) for line in lines])]
     parts += ["<h2>Arrived, by world</h2>", html_table(_by_world(rows, lines))]
     settings = [
         {"entry": line.entry, "map": entries[line.entry]["backend"], "settings": settings_text(entries[line.entry])}
@@ -176,7 +199,7 @@ def settings_text(entry: Mapping[str, Any]) -> str:
     return " ".join(f"{key}={value}" for key, value in sorted(entry["settings"].items()))
 
 
-def _page_line(line: Standing, is_entrant: bool) -> Row:
+def _page_line(line: Standing, is_entrant: bool, counts: Mapping[str, str]) -> Row:
     return {
         "": "▶" if is_entrant else "",
         "rank": "" if line.rank is None else line.rank,
@@ -187,6 +210,7 @@ def _page_line(line: Standing, is_entrant: bool) -> Row:
         "SPL": round(line.spl, 3),
         "time [s]": "" if line.time_s is None else line.time_s,
         "planning [ms]": "" if line.planning_ms is None else line.planning_ms,
+        **{title: "" if (count := getattr(line, name)) is None else count for title, name in counts.items()},
         "failures": failures_text(line),
         "most frequent reason": line.reason,
     }

@@ -16,6 +16,7 @@ from typing import Any
 import yaml
 
 from mbf_abstract.config.findings import ConfigError, Finding
+from terrain.provenance.named_files import hash_with_named_files
 from terrain.scenarios.scenario import Scenario
 
 Judge = Callable[[Scenario, int], bool]
@@ -103,15 +104,15 @@ class Protocol:
             "protocol": [self.name, self.version, dict(self.rules)],
             "navigation": {backend: _content(file) for backend, file in sorted(first.navigation.items())},
         }
-        surveys = {survey for trial in self.trials if (survey := _survey(trial)) is not None}
-        contents = {survey: hashlib.sha256(survey.read_bytes()).hexdigest() for survey in surveys}
+        files = {file for trial in self.trials if (file := _file(trial)) is not None}
+        contents = {file: hash_with_named_files(file).hex() for file in files}
         return {
             (trial.scenario.name, trial.seed): _hash_of({**common, **_stated(trial, contents)}) for trial in self.trials
         }
 
 
-def _survey(trial: Trial) -> Path | None:
-    """File of the ground, where it is no generated one."""
+def _file(trial: Trial) -> Path | None:
+    """Survey or floor plan of the world, where it is no generated one."""
     file: Path | None = getattr(trial.scenario.world, "file", None)
     return file
 
@@ -120,8 +121,8 @@ def _stated(trial: Trial, contents: Mapping[Path, str]) -> dict[str, Any]:
     """What a trial says, without paths of this machine; defaults that it leaves alone do not count."""
     scenario = trial.scenario
     keys = scenario.model_dump(mode="json", exclude_unset=True, exclude={"navigation": True, "world": {"file"}})
-    survey = _survey(trial)
-    return {"scenario": keys, "survey": None if survey is None else contents[survey], "seed": trial.seed}
+    file = _file(trial)
+    return {"scenario": keys, "survey": None if file is None else contents[file], "seed": trial.seed}
 
 
 def read_entries(file: Path) -> dict[str, Entry]:

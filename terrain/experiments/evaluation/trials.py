@@ -38,6 +38,8 @@ KEPT = (
     "energy_j",
     "slipped_m",
     "incidents",
+    "collisions_while_moving",
+    "near_misses",
     "digest",
 )
 LOST = "LOST"

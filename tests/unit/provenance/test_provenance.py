@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from mbf_abstract.config.findings import ConfigError
 from terrain.commands.command_line import command_line
 from terrain.description.parameters import UrdfRobot
+from terrain.experiments.evaluation.command import People
 from terrain.physics.robot_models import ROBOTS
 from terrain.provenance.code import commit_of, hash_of_code
 from terrain.provenance.named_files import InputCopies
@@ -85,6 +86,7 @@ def recorded_command(*arguments):
         seed: int = typer.Option(-1, "--seed"),
         settings: list[str] = typer.Option([], "--set"),
         page: bool = typer.Option(True, "--page/--no-page"),
+        people: People = typer.Option(People.YIELDING, "--people"),
     ):
         lines.append(command_line(context))
 
@@ -105,6 +107,7 @@ def recorded_command(*arguments):
             "mbf run lab.yaml --set a=1 --set b=c.ply",
         ),
         (["here/lab.yaml"], "mbf run here/lab.yaml"),
+        (["indoor", "--people", "blind"], "mbf run indoor --people blind"),
     ],
 )
 def test_the_command_line_is_recorded_without_folders_of_the_machine(arguments, expected):

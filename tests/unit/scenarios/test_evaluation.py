@@ -22,6 +22,7 @@ from terrain.experiments.evaluation.indoor import (
 )
 from terrain.experiments.evaluation.joining import join
 from terrain.experiments.evaluation.leaderboard import page, standings, terminal_table
+from terrain.experiments.evaluation.moving import APART, HALL, START, draw_walkers, moving, place_on
 from terrain.experiments.evaluation.outdoor import outdoor
 from terrain.experiments.evaluation.protocol import Entry, Trial
 from terrain.experiments.evaluation.results import (
@@ -37,8 +38,10 @@ from terrain.experiments.evaluation.trials import Task, failure_of, lost_row, ru
 from terrain.session.arrival import arrival_tolerance
 from terrain.sweeps.guarded_workers import Lost
 from terrain.sweeps.log import SweepLog
+from terrain.worlds.occupancy import read_occupancy
 
 OUTDOOR, INDOOR = outdoor([0]), indoor([0])
+MOVING, BLIND = moving([0]), moving([0], people="blind")
 
 
 def row(entry, world="level 0", route=True, failure="", spl=1.0, message="", **more):
@@ -54,9 +57,10 @@ def row(entry, world="level 0", route=True, failure="", spl=1.0, message="", **m
 def test_version_1_is_frozen():
     """Whoever changes a world, a configuration or a rule makes a version 2."""
     assert (OUTDOOR.hash, INDOOR.hash) == ("aa2b3979e61c", "f450f9248d20")
+    assert (MOVING.hash, BLIND.hash) == ("e5078dccb479", "b978e7631608")
 
 
-@pytest.mark.parametrize("protocol", [OUTDOOR, INDOOR], ids=lambda protocol: protocol.name)
+@pytest.mark.parametrize("protocol", [OUTDOOR, INDOOR, MOVING], ids=lambda protocol: protocol.name)
 def test_the_judge_has_a_tolerance_of_its_own_and_no_verdict_is_by_wall_time(protocol):
     scenario = protocol.trials[0].scenario
     assert all(trial.scenario.limits == scenario.limits for trial in protocol.trials)
@@ -119,6 +123,63 @@ def test_a_room_has_a_passage_if_a_disc_that_is_moved_cell_by_cell_gets_through(
         seen.update(new)
         front += new
     assert has_passage(posts, radius) == (goal in seen)
+
+
+def test_the_floor_plan_of_the_hall_is_in_the_hash_with_its_picture(tmp_path):
+    def hash_of(picture):
+        (tmp_path / "hall.yaml").write_bytes(HALL.read_bytes())
+        (tmp_path / "hall.png").write_bytes(picture)
+        scenario = MOVING.trials[0].scenario
+        world = scenario.world.model_copy(update={"file": tmp_path / "hall.yaml"})
+        return replace(MOVING, trials=[Trial(scenario.model_copy(update={"world": world}), 0)]).hash
+
+    picture = HALL.with_suffix(".png").read_bytes()
+    assert hash_of(picture) == moving([0], [0]).hash != hash_of(picture + b"another wall")
+
+
+def test_both_parts_have_the_same_people_who_look_in_one_and_not_in_the_other():
+    for trial, blind in zip(MOVING.trials, BLIND.trials, strict=True):
+        looking = [walker.model_copy(update={"blind": False}) for walker in blind.scenario.actors]
+        assert list(trial.scenario.actors) == looking != list(blind.scenario.actors)
+
+
+def test_a_higher_level_has_more_people_other_seeds_draw_others_and_nobody_begins_at_the_robot():
+    grid = read_occupancy(HALL)
+    for level in (0, 5, 9):
+        for seed in range(4):
+            walkers = draw_walkers(level, seed, False, grid)
+            assert len(walkers) == 2 + level
+            assert walkers == draw_walkers(level, seed, False, grid) != draw_walkers(level, seed + 1, False, grid)
+            for walker in walkers:
+                x, y = place_on(np.array(walker.route), walker.start)
+                assert np.hypot(x - START[0], y - START[1]) >= APART
+
+
+@pytest.mark.parametrize("along", [0.0, 0.7, 3.0, 11.9, 12.0, 13.5, 40.2])
+def test_a_place_on_a_closed_route_is_where_one_gets_to_in_small_steps(along):
+    route = [(0.0, 0.0), (3.0, 0.0), (3.0, 4.0)]  # 3 + 4 + 5 m
+    here, at, left = np.array(route[0]), 1, along
+    while left > 1e-9:
+        to = np.array(route[at % 3]) - here
+        step = min(left, 0.01, float(np.hypot(*to)))
+        here, left = here + to / np.hypot(*to) * step, left - step
+        at += np.hypot(*(np.array(route[at % 3]) - here)) < 1e-9
+    assert place_on(np.array(route), along) == pytest.approx(here, abs=1e-6)
+
+
+def test_contacts_and_near_misses_have_columns_where_there_are_some_and_an_old_result_has_none():
+    counted = {"collisions_while_moving": 1, "near_misses": 3}
+    rows = [row("a", failure="contact", **counted), row("a", "level 1", **counted), row("old"), row("old", "level 1")]
+    rows += [row("b", **dict.fromkeys(counted, 0)), row("b", "level 1", failure="error")]
+    lines = {line.entry: line for line in standings(rows, 2)}
+    counts = {name: (line.contacts, line.near_misses) for name, line in lines.items()}
+    assert counts == {"a": (2, 6), "old": (None, None), "b": (0, 0)}
+    entries = {name: {"backend": "mesh", "settings": {}} for name in lines}
+    assert "near misses" in page("title", [], rows, list(lines.values()), set(), entries)
+    assert "near misses" not in page("title", [], rows[2:4], [lines["old"], lines["b"]], set(), entries)
+    console = Console(width=80, file=StringIO())
+    console.print(terminal_table(list(lines.values()), "title"))
+    assert "contacts" in console.file.getvalue() and "misses" in console.file.getvalue()
 
 
 def test_the_more_successes_the_better_then_the_shorter_way_and_half_a_result_has_no_rank():
@@ -222,7 +283,7 @@ def test_the_results_that_ship_are_of_this_version_and_name_how_they_were_made()
 
 
 def test_all_shipped_entries_read_and_need_no_code_of_others():
-    for protocol in (OUTDOOR, INDOOR):
+    for protocol in (OUTDOOR, INDOOR, MOVING):
         for entry in protocol.entries.values():
             again = entrant(protocol, entry.settings, entry.backend, name="again")
             assert replace(again, name=entry.name) == entry

@@ -1,0 +1,104 @@
+"""Drives an evaluation as the command line asks for, and writes and prints its results."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+
+from mbf_abstract.event_values import well_formed
+from mbf_abstract.whole_files import write_whole
+from terrain.commands.verdict_line import TERMINAL_COLOURS
+from terrain.experiments.evaluation.entrant import entrant
+from terrain.experiments.evaluation.joining import join
+from terrain.experiments.evaluation.leaderboard import page, settings_text, standings, terminal_table
+from terrain.experiments.evaluation.protocol import Entry, Protocol
+from terrain.experiments.evaluation.results import described, read_results, results_of, shipped_results, write_results
+from terrain.experiments.evaluation.trials import run_trials
+from terrain.recording.verdict import Level
+
+ALL_SHIPPED = "all"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the command line asks for; see the options."""
+
+    settings: dict[str, str]
+    backend: str
+    name: str
+    beside: Sequence[str]
+    workers: int
+    time_limit: float
+    as_json: bool
+    out: Path
+    command: str
+
+
+def bench(protocol: Protocol, asked: Asked) -> None:
+    """Drive everything, and write and print the results."""
+    console = Console(stderr=asked.as_json)
+    entries = _entries(protocol, asked)
+    others = {name: read_results(Path(name)) for name in asked.beside if _is_file(name)}
+    if (shipped := shipped_results(protocol)) is not None:
+        others["the shipped results"] = shipped
+    rows = run_trials(protocol, entries, asked.out, asked.workers, asked.time_limit, _reporter(console))
+    results = results_of(protocol, entries, rows, asked.command)
+    asked.out.mkdir(parents=True, exist_ok=True)
+    write_results(results, asked.out / "results.json")
+    table = join(results, others, protocol)
+    lines = standings(table.rows, len(protocol.trials))
+    title = f"mbf bench {protocol.name} {protocol.version}"
+    own = {entry.name for entry in entries if entry.name not in protocol.entries}
+    about = [*_about(results.head), *table.origins]
+    write_whole(asked.out / "leaderboard.html", page(title, about, table.rows, lines, own, table.entries))
+    if asked.as_json:
+        typer.echo(json.dumps({**results.head, "standings": [vars(line) for line in lines]}))
+        return
+    console.print(terminal_table(lines, f"{title}, {len(protocol.trials)} worlds, protocol {protocol.hash}"))
+    known = {name: described(entry) for name, entry in protocol.entries.items()}
+    for name, entry in table.entries.items():
+        if known.get(name) != entry:
+            text = f"{name}: {entry['backend']}, {settings_text(entry)}"
+            console.print(well_formed(text), markup=False, highlight=False, soft_wrap=True)
+    for line in lines:
+        if line.entry in own and line.reason:
+            text = f"{line.entry} fails most often with: {line.reason}"
+            console.print(well_formed(text), markup=False, highlight=False, soft_wrap=True)
+    console.print(f"results in {asked.out}: results.json, leaderboard.html", markup=False, soft_wrap=True)
+
+
+def _entries(protocol: Protocol, asked: Asked) -> list[Entry]:
+    """The user's entry, and the shipped ones that are driven too, each once."""
+    names = [name for name in asked.beside if not _is_file(name)]
+    chosen = list(protocol.entries) if ALL_SHIPPED in names else list(dict.fromkeys(names))
+    own = [entrant(protocol, asked.settings, asked.backend, asked.name)] if asked.settings else []
+    return [*own, *(protocol.entry(name) for name in chosen)]
+
+
+def _is_file(name: str) -> bool:
+    return name.endswith(".json")
+
+
+def _reporter(console: Console) -> Callable[[dict[str, Any]], None]:
+    def report(row: dict[str, Any]) -> None:
+        text = well_formed(f"{row['entry']}, {row['world']}, seed {row['seed']}: {row['verdict']}")
+        style = TERMINAL_COLOURS[Level(row["level"])]
+        console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
+    return report
+
+
+def _about(head: dict[str, Any]) -> list[str]:
+    protocol = head["protocol"]
+    return [
+        f"{protocol['about']} {protocol['trials']} worlds; protocol {protocol['version']}, hash {protocol['hash']}.",
+        f"A success: {protocol['rules']['success']}. Rates are over the worlds that have a route by the judge. Ranked "
+        "by successes, then by SPL (success weighted by path length); who did not drive all worlds has no rank.",
+        f"Driven with: {head['command']} (mbf-flex {head['version']}).",
+    ]
