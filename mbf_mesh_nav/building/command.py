@@ -28,7 +28,7 @@ def _group() -> None:
 
 def build(
     inputs: list[Path] | None = typer.Argument(
-        None, help="Point clouds (PLY, PCD, LAS, XYZ, ...), or meshes to sample."
+        None, help="Point clouds (PLY, PCD, LAS, XYZ, OctoMap, ...), or meshes to sample."
     ),
     from_run: list[Path] = typer.Option(
         [], "--from-run", help="Folder of a run: what its range sensors hit. May be given several times."

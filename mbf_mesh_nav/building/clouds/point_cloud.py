@@ -16,6 +16,7 @@ from mbf_abstract.config.bounded_files import special_file
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.building.clouds.las_points import read_las_points
 from mbf_mesh_nav.building.clouds.mesh_points import MESH_ENDINGS, read_mesh_points
+from mbf_mesh_nav.building.clouds.octomap_points import read_octomap_points
 from mbf_mesh_nav.building.clouds.pcd_points import read_pcd_points
 from mbf_mesh_nav.building.clouds.ply_points import has_faces, read_ply_points
 from mbf_mesh_nav.building.clouds.run_points import read_run_points
@@ -31,6 +32,8 @@ READERS: dict[str, Reader] = {
     ".pcd": read_pcd_points,
     ".las": read_las_points,
     ".laz": read_las_points,
+    ".bt": read_octomap_points,
+    ".ot": read_octomap_points,
     **dict.fromkeys((".xyz", ".txt", ".csv", ".pts"), read_text_points),
 }
 """Readers by the ending of the file."""

@@ -58,11 +58,15 @@ def read_records(path: Path, file: BinaryIO, record: np.dtype[np.void], count: i
     """
     if record.itemsize == 0:
         raise MeshError(str(path), ["its points have no properties"])
-    here = file.seek(0, os.SEEK_CUR)
-    found = (os.fstat(file.fileno()).st_size - here) // record.itemsize
+    found = bytes_left(file) // record.itemsize
     if found < count:
         raise MeshError(str(path), [f"the file is cut off: expected {count} points, found {found}"])
     return np.fromfile(file, dtype=record, count=count)
+
+
+def bytes_left(file: BinaryIO) -> int:
+    """Bytes from the present place of a file to its end."""
+    return os.fstat(file.fileno()).st_size - file.seek(0, os.SEEK_CUR)
 
 
 def coordinates(path: Path, records: NDArray[np.void]) -> StoredPoints:

@@ -240,7 +240,7 @@ def test_a_las_file_in_degrees_or_mixed_units_is_refused(tmp_path, text, reason)
         ("a.pcd", b"VERSION 0.7\nFIELDS x y\nSIZE 4\nTYPE F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2\n", "no PCD header"),
         ("a.pcd", b"nothing", "is no PCD"),
         ("a.las", b"LASF" + bytes(100), "cannot be read as LAS"),
-        ("a.e57", b"", "unknown ending '.e57', known are: .csv, .dae, .glb"),
+        ("a.e57", b"", "unknown ending '.e57', known are: .bt, .csv, .dae, .glb"),
     ],
 )
 def test_a_file_that_is_not_what_its_name_says_is_refused(tmp_path, name, content, text):
