@@ -74,7 +74,9 @@ class RegulatedPurePursuitParameters(PluginParameters):
     )
     acc_lim_theta: float = parameter(3.2, "Change of the yaw rate in place.", unit="rad/s^2", gt=0.0, le=100.0)
     allow_reversing: bool = parameter(True, "Drive backward where the poses of the path look against its direction.")
-    max_cross_track: float = parameter(1.5, "Farther from the path than this it is missed.", unit="m", gt=0.0, le=100.0)
+    max_path_distance: float = parameter(
+        1.5, "Farther from the path than this it is missed.", unit="m", gt=0.0, le=100.0
+    )
     collision_check: bool = parameter(True, "Simulate the footprint ahead along the arc.")
     collision_check_time: float = parameter(1.0, "How far ahead in time it is simulated.", unit="s", gt=0.0, le=10.0)
     min_distance_to_obstacle: float = parameter(
@@ -157,7 +159,7 @@ class RegulatedPurePursuitController(PathFollower):
         if isinstance(cycle, ControlResult):
             return cycle
         tracker = cycle.tracker
-        furthest = self.parameters.max_cross_track * cycle.limit_factor
+        furthest = self.parameters.max_path_distance * cycle.limit_factor
         if tracker.deviation > furthest:
             text = f"{tracker.deviation:.2f} m off the path, limit {furthest:.2f} m"
             return ControlResult(ExePathOutcome.MISSED_PATH, text)

@@ -37,7 +37,7 @@ class RotationShimParameters(PluginParameters):
     )
     angular_done_threshold: float = parameter(0.3, "Aligned well enough to drive.", unit="rad", gt=0.0, le=3.2)
     forward_sampling_distance: float = parameter(0.5, "Path point to turn to.", unit="m", gt=0.0, le=10.0)
-    rotate_vel: float = parameter(1.2, "Yaw rate of the turn.", unit="rad/s", gt=0.0, le=20.0)
+    rotate_to_heading_vel: float = parameter(1.2, "Yaw rate of the turn.", unit="rad/s", gt=0.0, le=20.0)
     acc_lim_theta: float = parameter(3.2, "Change of the yaw rate.", unit="rad/s^2", gt=0.0, le=100.0)
     control_period: float = parameter(0.05, "Time between two calls.", unit="s", gt=0.0, le=1.0)
 
@@ -108,7 +108,7 @@ class RotationShimController(PathFollower):
     def _rotation(self, angle: float, speed: float) -> Twist:
         p = self.parameters
         change = p.acc_lim_theta * p.control_period
-        wanted = math.copysign(min(p.rotate_vel, math.sqrt(2.0 * p.acc_lim_theta * abs(angle))), angle)
+        wanted = math.copysign(min(p.rotate_to_heading_vel, math.sqrt(2.0 * p.acc_lim_theta * abs(angle))), angle)
         return Twist.planar(wz=min(max(wanted, speed - change), speed + change))
 
     def _sweeps_obstacle(self, cycle: ControlCycle, command: Twist) -> bool:

@@ -69,8 +69,8 @@ class MPPIParameters(PluginParameters):
     max_vel_theta: float = parameter(1.0, "Yaw rate limit, in both directions.", unit="rad/s", gt=0.0, le=5.0)
     wheelbase: float = parameter(0.5, "Distance of the axles (Ackermann).", unit="m", gt=0.0)
     max_steering_angle: float = parameter(0.5, "Steering limit (Ackermann).", unit="rad", gt=0.0, lt=1.5)
-    linear_noise: float = parameter(0.25, "Standard deviation of the speed samples.", unit="m/s", gt=0.0)
-    angular_noise: float = parameter(0.5, "Standard deviation of yaw rate (or steering) samples.", gt=0.0)
+    vx_std: float = parameter(0.25, "Standard deviation of the speed samples.", unit="m/s", gt=0.0)
+    wz_std: float = parameter(0.5, "Standard deviation of yaw rate (or steering) samples.", gt=0.0)
     decel_lim_x: float = parameter(0.4, "Deceleration planned before the goal.", unit="m/s^2", gt=0.0)
     path_weight: float = parameter(3.0, "Weight of the squared distance to the path.", ge=0.0)
     cost_weight: float = parameter(2.0, "Weight of the map's cost.", ge=0.0)
@@ -249,7 +249,7 @@ class MPPIController(MeshController):
         held = -(-p.time_steps // _NOISE_HOLD)
         # Two parts: one that changes, and one that lasts; only lasting turns lead round an obstacle.
         noise = self.rng.standard_normal((p.batch_size, held, 2)) + self.rng.standard_normal((p.batch_size, 1, 2))
-        noise *= (p.linear_noise, p.angular_noise)
+        noise *= (p.vx_std, p.wz_std)
         noise = np.repeat(noise, _NOISE_HOLD, axis=1)[:, : p.time_steps]
         noise[0] = 0.0
         controls = self._nominal + noise

@@ -3,7 +3,7 @@
 Strengths: needs only poses (any planner's path), a dozen lines of law, robust: a skid-steered robot that turns
 slower than commanded still converges, since the arc is computed anew every cycle. Slows down on slopes, in bends and
 towards the goal, and turns on the spot when the path leads elsewhere. Known failure: cuts corners by about
-``lookahead``² / (8 x bend radius); stops before new obstacles (BLOCKED_PATH) but does not drive around
+``look_ahead_dist``² / (8 x bend radius); stops before new obstacles (BLOCKED_PATH) but does not drive around
 it: plan anew while driving, or use ``mesh.mppi``.
 Cost: below 0.2 ms a cycle. Law: Coulter, "Implementation of the pure pursuit path tracking algorithm", CMU, 1992.
 """
@@ -38,13 +38,13 @@ OBSTACLE_STEP = 0.1  # m between two looks along the path
 class PathFollowerParameters(PluginParameters):
     """Parameters of ``mesh.path_follower``."""
 
-    lookahead: float = parameter(0.6, "Distance of the pursued point along the path.", unit="m", gt=0.0, le=10.0)
+    look_ahead_dist: float = parameter(0.6, "Distance of the pursued point along the path.", unit="m", gt=0.0, le=10.0)
     max_vel_x: float = parameter(0.8, "Forward speed on a flat, straight path.", unit="m/s", gt=0.0, le=5.0)
     min_speed: float = parameter(0.08, "Lowest forward speed while driving.", unit="m/s", gt=0.0, le=1.0)
     max_vel_theta: float = parameter(1.0, "Yaw rate limit, in both directions.", unit="rad/s", gt=0.0, le=5.0)
     decel_lim_x: float = parameter(0.4, "Deceleration planned before the goal.", unit="m/s^2", gt=0.0)
     max_lateral_acceleration: float = parameter(0.6, "Limits the speed in bends.", unit="m/s^2", gt=0.0)
-    turn_in_place_angle: float = parameter(
+    rotate_to_heading_min_angle: float = parameter(
         0.9, "Beyond this heading error the robot turns on the spot.", unit="rad", gt=0.0, le=math.pi
     )
     turn_gain: float = parameter(2.0, "Yaw rate per heading error when turning on the spot.", unit="1/s", gt=0.0)
@@ -138,9 +138,9 @@ class PathFollower(MeshController):
         """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""
         p = self.parameters
         tracker = self._tracker
-        target = tracker.point_at(min(tracker.progress + p.lookahead, tracker.next_cusp))
+        target = tracker.point_at(min(tracker.progress + p.look_ahead_dist, tracker.next_cusp))
         bearing, curvature = arc_to(pose, target)
-        if abs(bearing) > p.turn_in_place_angle:
+        if abs(bearing) > p.rotate_to_heading_min_angle:
             return self._command(0.0, p.turn_gain * bearing)
         slope_factor = 1.0 - (1.0 - p.slope_speed_factor) * min(slope / p.slow_slope, 1.0)
         # A robot that ran past the goal has no path left, but still a distance to drive back; the height of its frame

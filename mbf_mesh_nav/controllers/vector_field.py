@@ -33,7 +33,7 @@ class VectorFieldParameters(PluginParameters):
 
     max_vel_x: float = parameter(1.0, "Forward speed limit.", unit="m/s", gt=0.0, le=5.0)
     max_vel_theta: float = parameter(0.5, "Yaw rate limit, in both directions.", unit="rad/s", gt=0.0, le=2.0)
-    max_angle: float = parameter(
+    rotate_to_heading_min_angle: float = parameter(
         math.radians(20.0), "Beyond this heading error the robot turns on the spot.", unit="rad", gt=0.0, le=math.pi
     )
     lin_vel_factor: float = parameter(1.0, "Multiplies the speed before it is limited.", ge=0.1, le=10.0)
@@ -44,7 +44,7 @@ class VectorFieldParameters(PluginParameters):
         0.08, "Nearer to the goal than this the robot only turns to the final heading.", unit="m", gt=0.0
     )
     via_distance: float = parameter(0.3, "A via point counts as passed within this distance.", unit="m", gt=0.0)
-    max_search_distance: float = parameter(
+    max_surface_distance: float = parameter(
         0.4, "Farther from the surface than this the robot is out of the map.", unit="m", gt=0.0, le=2.0
     )
 
@@ -71,7 +71,7 @@ class VectorFieldController(MeshController):
         if not all(isinstance(one, VectorField) and one.topology is self.mesh_map.topology for one in fields):
             return False
         self._fields: tuple[VectorField, ...] = fields
-        self._tracker = tracker_on_surface(self.mesh_map, self._last_leg(path), self.parameters.max_search_distance)
+        self._tracker = tracker_on_surface(self.mesh_map, self._last_leg(path), self.parameters.max_surface_distance)
         self._approach = GoalApproach(path[-1], self.parameters.goal_distance, STRAYING)
         self._leg = 0
         self._face = -1
@@ -82,7 +82,7 @@ class VectorFieldController(MeshController):
         if self._approach is None:
             return ControlResult(ExePathOutcome.INVALID_PATH, "there is no plan to follow")
         pose = request.pose
-        reach = self.parameters.max_search_distance
+        reach = self.parameters.max_surface_distance
         spot = self.mesh_map.locate_one(pose.position, reach, self._face)
         if spot is None:
             return ControlResult(ExePathOutcome.OUT_OF_MAP, f"the robot is more than {reach:g} m from the surface")
@@ -122,9 +122,9 @@ class VectorFieldController(MeshController):
     def _steer(self, error: float, distance_to_goal: float) -> ControlResult:
         """Apply the law to a heading error [rad, left positive] and the distance [m] left to the goal."""
         p = self.parameters
-        if abs(error) > p.max_angle:
+        if abs(error) > p.rotate_to_heading_min_angle:
             return self._command(0.0, self._turn_rate(error))
-        speed = p.max_vel_x * (1.0 - abs(error) / p.max_angle) * p.lin_vel_factor
+        speed = p.max_vel_x * (1.0 - abs(error) / p.rotate_to_heading_min_angle) * p.lin_vel_factor
         fading = min(1.0, distance_to_goal / p.arrival_fading) if self._on_last_leg else 1.0
         faded = max(p.max_vel_x * fading, p.min_speed)
         return self._command(min(speed, faded, p.max_vel_x), self._turn_rate(error))

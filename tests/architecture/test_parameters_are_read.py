@@ -1,11 +1,12 @@
-"""A documented parameter has an effect: some code reads it."""
+"""A documented parameter has an effect: some code reads it. What means the same has one name on every map."""
 
 import ast
 import importlib
 import pkgutil
+from collections import defaultdict
 from pathlib import Path
 
-from mbf_abstract.parameters import ParameterModel
+from mbf_abstract.parameters import ParameterModel, PluginParameters
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "mbf_ros", "terrain")
@@ -55,3 +56,13 @@ def test_every_parameter_is_read():
     ]
     assert len(models) > 80
     assert not dead, "read by no code: " + ", ".join(sorted(dead))
+
+
+def test_parameters_of_plugins_that_are_described_alike_have_one_name():
+    names = defaultdict(set)
+    for model in (model for model in parameter_models() if issubclass(model, PluginParameters)):
+        for name, field in model.model_fields.items():
+            names[field.description].add(name)
+    twice = [f"{' / '.join(sorted(found))}: {text}" for text, found in names.items() if text and len(found) > 1]
+    assert len(names) > 200
+    assert not twice, "one meaning, several names: " + "; ".join(sorted(twice))

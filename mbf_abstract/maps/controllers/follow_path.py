@@ -42,7 +42,7 @@ class FollowPathParameters(PluginParameters):
     look_ahead_dist: float = parameter(
         0.5, "Distance along the path of the point that is steered to.", unit="m", gt=0.0, le=20.0
     )
-    turn_in_place_angle: float = parameter(
+    rotate_to_heading_min_angle: float = parameter(
         0.8, "The robot turns on the spot to a point farther off its heading.", unit="rad", gt=0.0, le=math.pi
     )
     turn_gain: float = parameter(2.0, "Yaw rate per heading error when turning on the spot.", unit="1/s", gt=0.0)
@@ -127,7 +127,7 @@ class FollowPath(MapPlugin, AbstractController):
             return [self._turn(turn)]
         bearing, curvature = self._carrot(pose, tracker)
         error = off_course(bearing, backward)
-        if abs(error) > p.turn_in_place_angle:
+        if abs(error) > p.rotate_to_heading_min_angle:
             return curves_ahead(self._turn(error), error, backward)
         left = max(tracker.to_cusp, gap if tracker.on_last_section else 0.0)
         speed = min(p.max_vel_x, p.max_vel_theta / max(abs(curvature), 1e-6), math.sqrt(2.0 * p.decel_lim_x * left))

@@ -22,7 +22,7 @@ class RotateParameters(GuardedMotionParameters):
     """Parameters of ``rotate``."""
 
     angle: float = parameter(2.0 * math.pi, "Angle to turn, left positive.", unit="rad", ge=-31.5, le=31.5)
-    yaw_rate: float = parameter(0.8, "Largest yaw rate.", unit="rad/s", gt=0.0, le=10.0)
+    yaw_rate: float = parameter(0.8, "How fast it turns, at most.", unit="rad/s", gt=0.0, le=10.0)
     min_yaw_rate: float = parameter(0.2, "Least yaw rate while braking.", unit="rad/s", gt=0.0, le=10.0)
     acc_lim_theta: float = parameter(1.6, "Braking of the turn.", unit="rad/s^2", gt=0.0, le=100.0)
     tolerance: float = parameter(0.05, "Allowed rest of the angle.", unit="rad", gt=0.0, le=1.0)

@@ -99,7 +99,7 @@ def test_arrival_is_wider_until_the_time_is_over(server):
 
 
 def test_a_controller_tolerates_twice_the_distance_from_its_path_while_relaxed(make_plugin):
-    controller = make_plugin(RegulatedPurePursuitController, np.zeros((60, 60)), resolution=0.1, max_cross_track=0.5)
+    controller = make_plugin(RegulatedPurePursuitController, np.zeros((60, 60)), resolution=0.1, max_path_distance=0.5)
     controller.set_plan(Path.from_points([(1.0, 2.0, 0.0), (5.0, 2.0, 0.0)]))
     request = ControlRequest(Pose.planar(2.0, 2.8), Twist())
     outcomes = []

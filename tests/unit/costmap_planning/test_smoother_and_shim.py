@@ -225,7 +225,9 @@ def test_the_shim_takes_every_type_that_the_list_of_controllers_takes(make_plugi
     ],
 )
 def test_an_inner_type_that_is_no_controller_is_a_finding_with_its_line(make_plugin, tmp_path, inner_type, text):
-    ((line, key, message),) = findings_of(tmp_path, f'shim:\n  rotate_vel: 1.0\n  inner_type: "{inner_type}"\n')
+    ((line, key, message),) = findings_of(
+        tmp_path, f'shim:\n  rotate_to_heading_vel: 1.0\n  inner_type: "{inner_type}"\n'
+    )
     assert (line, key) == (8, "shim.inner_type") and text in message
     with pytest.raises(PluginError, match=text):
         make_plugin(RotationShimController, FREE, inner_type=inner_type)

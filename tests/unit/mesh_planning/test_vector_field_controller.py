@@ -41,7 +41,7 @@ def test_the_yaw_rate_is_proportional_and_limited_on_both_sides(ready, error):
     controller = ready(ang_vel_factor=7.0, max_vel_theta=0.5)
     command = command_at(controller, Pose.planar(2, 3, -error))
     assert command.wz == pytest.approx(math.copysign(min(0.5, abs(error) * 0.5 / math.pi * 7.0), error), abs=0.02)
-    expected = 1.0 - abs(error) / controller.parameters.max_angle
+    expected = 1.0 - abs(error) / controller.parameters.rotate_to_heading_min_angle
     assert command.vx == pytest.approx(max(expected, 0.0), abs=0.03)
 
 
@@ -82,7 +82,7 @@ def test_it_reaches_the_goal_over_hills_through_a_via_point_and_from_a_disturban
     via, goal = Pose.planar(5.0, 3.0), Pose.planar(0.8, 5.0, 2.0)
     planner = make_plugin(CVPPlanner, hills, goal_dist_offset=3.0)
     plan = planner.make_plan(PlanRequest(Pose.planar(0.6, 0.5), goal, via=(via,)))
-    controller = make_plugin(VectorFieldController, hills, max_angle=0.6, max_vel_theta=1.0)
+    controller = make_plugin(VectorFieldController, hills, rotate_to_heading_min_angle=0.6, max_vel_theta=1.0)
     assert controller.set_plan(plan.path)
     poses = drive(controller, hills, pose_on(hills, (0.9, 1.4, 0), (-1, 0.5, 0)), 60.0)  # 0.9 m off the start
     assert controller.is_goal_reached(poses[-1], 0.15, 0.2), poses[-1]
