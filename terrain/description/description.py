@@ -19,10 +19,12 @@ from terrain.description.masses import mass_of, notes_on_masses, some_of
 from terrain.description.mesh_files import find_file, missing_text
 from terrain.description.outline import Corner, as_array, convex_outline, with_few_corners
 from terrain.description.parameters import DriveName, UrdfRobot
-from terrain.description.running_gear import RunningGear, find_running_gear, sides_of, solids_of
+from terrain.description.running_gear import RunningGear, sides_of, solids_of
 from terrain.description.solids import Placed
 from terrain.description.stability import Edges, Tipping, clear_angles, seen_from_the_side, tipping
-from terrain.description.urdf import Urdf, link_frames, read_urdf
+from terrain.description.urdf import Urdf, link_frames
+from terrain.description.urdf_reader import read_urdf
+from terrain.description.wheel_search import find_running_gear
 
 UP = np.array([0.0, 0.0, 1.0])
 USUAL_SPEED = 1.0  # m/s, where the file states no speed of the wheels

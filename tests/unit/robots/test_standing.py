@@ -14,7 +14,8 @@ from terrain.description.masses import is_possible_inertia, mass_of
 from terrain.description.outline import as_array, convex_outline, with_few_corners
 from terrain.description.solids import Box, Cylinder, Hull, Placed, Sphere, points_between
 from terrain.description.stability import clear_angles, tipping
-from terrain.description.urdf import Inertial, link_frames, read_urdf, transform_of
+from terrain.description.urdf import Inertial, link_frames, transform_of
+from terrain.description.urdf_reader import read_urdf
 
 COORDINATE = st.floats(-1.0, 1.0).map(lambda value: round(value, 3))
 POINTS = st.lists(st.tuples(COORDINATE, COORDINATE), min_size=3, max_size=12)
