@@ -27,6 +27,7 @@ from mbf_abstract.goals.goal_types import (
 )
 from mbf_abstract.goals.handle import GoalHandle, GoalStatus
 from mbf_abstract.outcomes import MoveBaseOutcome
+from mbf_abstract.time.clock import ThreadDetached
 
 Handle = GoalHandle[FollowWaypointsGoal, FollowWaypointsResult, FollowWaypointsFeedback]
 Job = GoalJob[FollowWaypointsGoal, FollowWaypointsResult, FollowWaypointsFeedback]
@@ -155,7 +156,7 @@ class _Run:
 
 
 class _TaskRun:
-    """One run of the user's task; a cancel waits for it no longer than the grace."""
+    """One run of the user's task; a cancel waits for it no longer than the grace, and the hang guard watches it."""
 
     def __init__(self, job: Job, task: WaypointTask, waypoint: int) -> None:
         self._job = job
@@ -166,14 +167,18 @@ class _TaskRun:
         self._condition = self._runtime.clock.condition()
         self._over = False
         self._abandoned = False
+        self._hung = False
 
     def run(self, pose: Pose) -> str:
         """Call the task and return what went wrong; raises Abandoned if the sequence has ended meanwhile."""
         supervisor, problem = self._runtime.supervisor, ""
-        watch = supervisor.watch(self._check, 0.0)
+        self._watch = watch = supervisor.watch(self._check, 0.0)
         self._job.handle.on_wake(lambda: supervisor.poke(watch))
         try:
-            self._task(self._waypoint, pose)
+            with self._runtime.clock.guarded(f"the task at waypoint {self._waypoint}", self._declare_hung):
+                self._task(self._waypoint, pose)
+        except ThreadDetached:
+            self._abandon()  # the supervisor may not have seen it yet
         except BaseException as error:
             problem = f"the task at waypoint {self._waypoint} raised {type(error).__name__}: {error_text(error)}"
             name, goal_id = self._job.action.name, self._job.handle.id
@@ -189,18 +194,31 @@ class _TaskRun:
     def _check(self) -> float | None:
         """Supervisor: give up on the task when the grace after a cancel is over."""
         handle, now = self._job.handle, self._runtime.clock.now()
+        if self._hung:
+            return self._abandon()
         if not handle.cancel_requested:
             return IDLE_CHECK
         if self._canceled_at is None:
             self._canceled_at = now
         grace_left = self._canceled_at + self._runtime.parameters.cancel_grace - now
-        if grace_left > 1e-9:
-            return grace_left
+        return grace_left if grace_left > 1e-9 else self._abandon()
+
+    def _declare_hung(self) -> None:
+        """Give up at once: the task has stopped simulated time for too long, and its thread was detached."""
+        self._hung = True
+        self._runtime.supervisor.poke(self._watch)
+
+    def _abandon(self) -> float | None:
+        """End the sequence without the task's thread, once; the answer to the supervisor."""
         with self._condition:
-            if self._over:
+            if self._over or self._abandoned:
                 return None
             self._abandoned = True
             self._runtime.hanging.add(self)
-        text = f"{handle.cancel_reason}; the task at waypoint {self._waypoint} has not ended yet"
-        self._job.abandon(MoveBaseOutcome.CANCELED, text)
+        if self._job.handle.cancel_requested:
+            text = f"{self._job.handle.cancel_reason}; the task at waypoint {self._waypoint} has not ended yet"
+            self._job.abandon(MoveBaseOutcome.CANCELED, text)
+        else:
+            text = f"the task at waypoint {self._waypoint} kept the clock standing for too long (hang_guard)"
+            self._job.abandon(MoveBaseOutcome.INTERNAL_ERROR, text)
         return None

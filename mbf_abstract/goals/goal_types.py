@@ -126,7 +126,8 @@ class FollowWaypointsGoal:
         End the sequence at the first visit that fails; otherwise go on to the next pose.
     task : callable, optional
         Called as ``task(index, pose)`` at every pose that was reached, while the robot stands there. It may take its
-        time; one that raises ends the sequence with INTERNAL_ERROR.
+        time; one that raises ends the sequence with INTERNAL_ERROR, and so does one that stops simulated time for
+        longer than ``hang_guard`` (what blocks for real belongs into ``with clock.outside()``).
     planner, controller, recovery_behaviors, dist_tolerance, angle_tolerance
         As in ``MoveBaseGoal``.
     """

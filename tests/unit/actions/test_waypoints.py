@@ -9,9 +9,10 @@ from mbf_abstract.goals.goal_types import FollowWaypointsGoal, MoveBaseGoal
 from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult
-from mbf_abstract.testing.faulty import Hang
+from mbf_abstract.testing.faulty import BusyHang, Hang
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
 from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
 
@@ -214,3 +215,18 @@ def test_a_cancel_waits_for_a_hanging_task_no_longer_than_the_grace(make_session
     assert not session.server.runtime.hanging
     assert_ended_once(session, handle)
     assert_next_goals_work(session)
+
+
+def test_a_task_that_stops_simulated_time_is_found_by_the_wall_clock_guard():
+    with ScriptedSession(hang_guard=0.2, max_quarantined=1) as session:
+        for _ in range(2):  # more than max_quarantined
+            hang = BusyHang()
+            handle = session.navigator.send(FollowWaypointsGoal(NEAR, task=lambda index, pose, hang=hang: hang(pose)))
+            result = handle.wait()
+            assert (result.outcome, len(result.results)) == (MoveBaseOutcome.INTERNAL_ERROR, 1)
+            assert "the task at waypoint 0 kept the clock standing" in result.message
+            assert_ended_once(session, handle)
+            hang.release.cancel()
+            while session.server.runtime.hanging:
+                session.clock.sleep(0.01)
+            assert_next_goals_work(session)
