@@ -14,6 +14,7 @@ from importlib.metadata import EntryPoint, entry_points, version
 import typer
 
 from mbf_abstract.commands import check, doctor, new, plan, plugins
+from mbf_abstract.commands.command_group import CommandGroup
 from mbf_abstract.config.installed_plugins import DISTRIBUTION
 
 COMMANDS_GROUP = "mbf.commands"
@@ -23,16 +24,19 @@ def make_app() -> typer.Typer:
     """Build the application with the commands of all installed packages."""
     app = typer.Typer(
         name="mbf",
+        cls=CommandGroup,
         help="Map-independent navigation for mobile robots, on 2D costmaps and 3D triangle meshes.",
         no_args_is_help=True,
         pretty_exceptions_enable=False,
-        rich_markup_mode="markdown",  # "rich", the default, takes a unit such as [m] for markup and drops it
+        rich_markup_mode=None,  # plain text: markup would take a unit such as [m] for its own, and rich costs 0.1 s
     )
     app.callback()(_options)
     for command in (plan, check, plugins, new, doctor):
         command.register(app)
     for point in sorted(entry_points(group=COMMANDS_GROUP), key=lambda point: point.name):
         _add_commands(app, point)
+    for group in app.registered_groups:
+        group.cls = CommandGroup
     return app
 
 

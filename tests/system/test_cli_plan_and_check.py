@@ -18,7 +18,7 @@ from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from terrain.worlds.heightfield import Heightfield
 
 OFFICE = Path(__file__).resolve().parents[2] / "terrain" / "data" / "office.yaml"
-HEAVY = ("numba", "scipy", "trimesh", "pybullet", "numpy", "pydantic", "matplotlib", "viser")
+HEAVY = ("numba", "scipy", "trimesh", "pybullet", "numpy", "pydantic", "matplotlib", "viser", "rich")
 
 
 def mbf(*arguments):
