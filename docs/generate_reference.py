@@ -3,10 +3,10 @@
     python docs/generate_reference.py            write all of them
     python docs/generate_reference.py --check    write nothing; exit code 1 and the names of pages that are out of date
 
-Written are ``configuration.md`` (every parameter of every model), the example plugins (what ``mbf new`` writes), the
-listings in the guides (the text of the example files), the table of metrics in ``verdict.md``, that of a robot's keys
-in ``your_robot.md``, tables of the parameter models that a page names, and the table of ``faults_and_promises.md``
-(the docstrings of ``tests/faults``).
+Written are ``configuration.md`` (every parameter of every model), ``scenario_reference.md`` (every key of a scenario),
+the example plugins (what ``mbf new`` writes), the listings in the guides (the text of the example files), the table of
+metrics in ``verdict.md``, that of a robot's keys in ``your_robot.md``, tables of parameter models that a page names,
+and the table of ``faults_and_promises.md`` (the docstrings of ``tests/faults``).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import sys
 from pathlib import Path
 
 from parameter_tables import configuration_page, parameter_table
+from scenario_tables import scenario_page
 
 from mbf_abstract.commands.new import plugin_source
 from terrain.description.parameters import UrdfRobot
@@ -50,7 +51,7 @@ FAULT_ROW = re.compile(r"Fault table, rows? (?P<rows>[\d, and]+)[^:]*: (?P<text>
 
 def generate() -> dict[Path, str]:
     """Return every generated file with the text it should have."""
-    texts = {DOCS / "configuration.md": configuration_page()}
+    texts = {DOCS / "configuration.md": configuration_page(), DOCS / "scenario_reference.md": scenario_page()}
     for name, (kind, map_name) in EXAMPLES.items():
         texts[REPOSITORY / "examples" / "plugins" / f"{name}.py"] = plugin_source(kind, name, map_name)
     for page in sorted(DOCS.glob("*.md")):

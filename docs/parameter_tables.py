@@ -96,23 +96,29 @@ def _plugin(name: str, plugin_class: Any) -> str:
     return f"### `{name}`\n\n{summary}\n\n{parameter_table(plugin_class.Parameters)}"
 
 
-def parameter_table(model: type[ParameterModel], names: list[str] | None = None, dynamic: bool = True) -> str:
-    """Return the Markdown table of a model's parameters, or of some of them; none is dynamic inside one that is not."""
+def parameter_table(model: type[ParameterModel], names: list[str] | None = None, dynamic: bool | None = True) -> str:
+    """Return the Markdown table of a model's parameters, or of some of them; none is dynamic inside one that is not.
+
+    With ``dynamic`` None nothing of the model is read while running: the table has no column for it, and none of the
+    tables of the models inside.
+    """
     fields = {name: field for name, field in model.model_fields.items() if names is None or name in names}
     if not fields:
         return "No parameters.\n"
-    rows = [
-        "| name | default | unit | range | while running | meaning |",
-        "|---|---|---|---|---|---|",
-    ]
+    headings = ["name", "default", "unit", "range", "while running", "meaning"]
+    if dynamic is None:
+        headings.remove("while running")
+    rows = ["| " + " | ".join(headings) + " |", "|" + "---|" * len(headings)]
     for name, field in fields.items():
         extra: Any = field.json_schema_extra or {}
-        changes = "yes" if dynamic and extra.get("dynamic", True) else "no"
-        cells = (f"`{name}`", _default(field), extra.get("unit", ""), _range(field), changes, field.description or "")
+        changes = [] if dynamic is None else ["yes" if dynamic and extra.get("dynamic", True) else "no"]
+        cells = (f"`{name}`", _default(field), extra.get("unit", ""), _range(field), *changes, field.description or "")
         rows.append("| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |")
     table = "\n".join(rows) + "\n"
+    if dynamic is None:
+        return table
     for name, field in fields.items():
-        for inner in _models_in(field.annotation):
+        for inner in models_in(field.annotation):
             summary = (inspect.getdoc(inner) or "").partition("\n\n")[0]
             extra = field.json_schema_extra or {}
             keys = parameter_table(inner, dynamic=dynamic and extra.get("dynamic", True))
@@ -120,11 +126,11 @@ def parameter_table(model: type[ParameterModel], names: list[str] | None = None,
     return table
 
 
-def _models_in(annotation: Any) -> list[type[ParameterModel]]:
+def models_in(annotation: Any) -> list[type[ParameterModel]]:
     """Parameter models inside a type such as ``tuple[Zone, ...]`` or ``dict[str, Source]``."""
     if isinstance(annotation, type) and issubclass(annotation, ParameterModel):
         return [annotation]
-    return [model for part in get_args(annotation) for model in _models_in(part)]
+    return [model for part in get_args(annotation) for model in models_in(part)]
 
 
 def _default(field: FieldInfo) -> str:

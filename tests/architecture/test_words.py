@@ -53,6 +53,7 @@ ALLOWED_NAMES = {
 ALLOWED_PROSE = {
     ("terrain/scenarios/features.py", "rim"): "of a crater",
     ("terrain/worlds/generate.py", "rim"): "of a crater",
+    ("docs/scenario_reference.md", "rim"): "of a crater, from the parameter models",
 }
 
 
@@ -144,7 +145,7 @@ def test_documentation_uses_the_fields_words():
         for page in PAGES
         for number, line in prose(page)
         for word in re.findall(r"[a-z]+", line.lower())
-        if is_banned(word)
+        if is_banned(word) and (page.relative_to(REPOSITORY).as_posix(), word) not in ALLOWED_PROSE
     ]
     assert offenders == []
 

@@ -55,3 +55,11 @@ def test_every_metric_of_a_recording_has_a_row_with_a_sentence(generated):
     fields = {field.name for field in dataclasses.fields(Metrics)} - {"scenario", "backend"}
     assert fields <= set(named)
     assert all(text.endswith(".") for name, text in named.items() if name in fields)
+
+
+def test_every_key_of_a_scenario_has_a_sentence_and_every_type_of_a_block_a_section(generated):
+    page = generated[DOCS / "scenario_reference.md"]
+    assert not re.findall(r"^\|.*\|\s*\|$", page, re.MULTILINE), "a key without a sentence"
+    for block, kind in (("world", "mesh"), ("features", "boulders"), ("sensors", "depth"), ("actors", "crowd")):
+        assert re.search(rf"^### `{block}` of type .*`{kind}`", page, re.MULTILINE)
+    assert page.count("| `max_tilt` |") == 1, "a model is shown once"
