@@ -6,6 +6,7 @@ is taken over by the running loop, and the robot does not stop. See ``execution.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from mbf_abstract.actions.action import GoalJob
@@ -17,6 +18,7 @@ from mbf_abstract.execution.controller_state import ControllerEnd, Plan
 from mbf_abstract.execution.plan_check import arrival_problem, path_in_global_frame
 from mbf_abstract.execution.progress import PathProgress
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.tangent_plane import SAME_STOREY
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import ExePathFeedback, ExePathGoal, ExePathResult
 from mbf_abstract.goals.handle import GoalHandle
@@ -89,6 +91,7 @@ class ExePathAction(PluginAction[ExePathGoal, ExePathResult, ExePathFeedback, Ab
             parameters.angle_tolerance if goal.angle_tolerance is None else goal.angle_tolerance,
             self._tolerance_check(),
             goal.goal_area,
+            math.inf if self.runtime.map_hooks.ground_is_level else SAME_STOREY,
         )
         return Plan(path, arrival)
 

@@ -25,6 +25,10 @@ from mbf_abstract.traffic.traffic import Traffic
 class MapHooks(Protocol):
     """What a server of a map may add to every execution."""
 
+    @property
+    def ground_is_level(self) -> bool:
+        """Whether all ground is at one height, so that heights of poses mean nothing."""
+
     def map_problem(self) -> str:
         """Why the map must not be driven on right now (e.g. a silent sensor); empty = it is current."""
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.polygon import inside_polygon
+from mbf_abstract.geometry.tangent_plane import heading_error
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 
@@ -152,7 +153,7 @@ class PoseSetArea(GoalArea):
 
     def depth(self, pose: Pose) -> float:
         """What is left [m] of the tolerance at the nearest member; one with another heading is out of reach."""
-        headings = [pose.angle_to(member) <= self.angle_tolerance for member in self.poses]
+        headings = [abs(heading_error(pose, member)) <= self.angle_tolerance for member in self.poses]
         gaps = [pose.distance_to(member) for member, looks in zip(self.poses, headings, strict=True) if looks]
         return self.dist_tolerance - min(gaps, default=math.inf)
 

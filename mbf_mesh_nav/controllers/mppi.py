@@ -22,6 +22,7 @@ import numpy as np
 from mbf_abstract.execution.path_tracker import reverse_segments
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import exp, norm, tan
+from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, Encounters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -36,8 +37,6 @@ from mbf_mesh_nav.motion.goal_approach import (
     GoalApproach,
     braking_speed,
     clamp,
-    ground_distance,
-    heading_error,
     missed_path,
     tracker_on_surface,
 )

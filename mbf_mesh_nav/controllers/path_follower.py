@@ -16,6 +16,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to, in_robot_frame
+from mbf_abstract.geometry.tangent_plane import heading_error
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
@@ -26,7 +27,6 @@ from mbf_mesh_nav.motion.goal_approach import (
     GoalApproach,
     braking_speed,
     clamp,
-    heading_error,
     missed_path,
     tracker_on_surface,
 )

@@ -16,11 +16,12 @@ import numpy as np
 
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm, rotated_back
+from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
-from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, ground_distance, heading_error, tracker_on_surface
+from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, tracker_on_surface
 from mbf_mesh_nav.motion.vector_field import VectorField
 from mbf_mesh_nav.plugins import MeshController
 

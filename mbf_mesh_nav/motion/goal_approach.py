@@ -1,4 +1,4 @@
-"""What controllers on meshes share about arriving: heading errors in the tangent plane and the goal test."""
+"""What controllers on meshes share about arriving: the goal test, and the approach to the end of a path."""
 
 from __future__ import annotations
 
@@ -9,29 +9,10 @@ import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.geometry.arcs import in_robot_frame
-from mbf_abstract.geometry.arithmetic import rotated_back
+from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult
 from mbf_mesh_nav.map.mesh_map import MeshMap
-
-_SAME_STOREY = 0.5  # [m]
-
-
-def heading_error(pose: Pose, other: Pose) -> float:
-    """Angle [rad] in (-pi, pi] the robot has to turn left, about its own z axis, to look where ``other`` looks."""
-    ahead = rotated_back(pose.rotation, other.rotation[:, 0])
-    return math.atan2(ahead[1], ahead[0])
-
-
-def ground_distance(pose: Pose, goal: Pose) -> float:
-    """Distance [m] to the goal in the robot's tangent plane.
-
-    A goal given a little above or below the surface, and a robot frame above it, do not count; a goal more than
-    ``_SAME_STOREY`` off the plane is on another storey, then the distance is Euclidean.
-    """
-    x, y, z = in_robot_frame(pose, np.asarray(goal.position))
-    return math.hypot(x, y) if abs(z) <= _SAME_STOREY else math.hypot(x, y, z)
 
 
 def is_at_goal(pose: Pose, goal: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:

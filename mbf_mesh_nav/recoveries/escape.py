@@ -17,6 +17,7 @@ import numpy as np
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to
+from mbf_abstract.geometry.tangent_plane import ground_distance
 from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import parameter
@@ -26,7 +27,7 @@ from mbf_mesh_nav.kernels.search.dijkstra import follow_predecessors, propagate_
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.surface_point import nearest_corner
-from mbf_mesh_nav.motion.goal_approach import clamp, ground_distance
+from mbf_mesh_nav.motion.goal_approach import clamp
 from mbf_mesh_nav.plugins import MeshRecovery
 from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, search_graph, seeded_arrays, threshold_step
 

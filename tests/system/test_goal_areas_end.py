@@ -53,17 +53,35 @@ AREAS = {
 }
 
 
-@pytest.mark.parametrize("area", AREAS.values(), ids=AREAS)
-@pytest.mark.parametrize(("backend", "controller"), [(b, c) for b, names in CONTROLLERS.items() for c in names])
-def test_a_robot_comes_to_stand_inside_the_area(tmp_path, backend, controller, area):
+def drive_to(tmp_path, backend, goal, **parameters):
+    """Drive to a goal on a level floor of 6 m x 6 m; the result and the robot's last pose."""
     trimesh.Trimesh(*heightfield_mesh(np.zeros((31, 31)), 0.2, 0.2), process=False).export(tmp_path / "floor.ply")
     (tmp_path / "server.yaml").write_text(CONFIGS[backend])
     clock, transforms = SimClock(), TransformBuffer()
     robot = LoopbackRobot(clock, transforms, Pose.planar(1.0, 1.0))
     with Navigator.from_file(tmp_path / "server.yaml", robot, clock, transforms) as navigator:
+        navigator.server.set_parameters(**parameters)
         clock.sleep(0.5)
-        goal = MoveBaseGoal(Pose.planar(0.0, 0.0), controller=controller, goal_area=area, recovery_behaviors=())
         result = navigator.send(goal).wait(timeout=100.0)
-        assert result is not None and result.success, result
-        assert area.contains(robot.pose)
     robot.close()
+    return result, robot.pose
+
+
+@pytest.mark.parametrize("area", AREAS.values(), ids=AREAS)
+@pytest.mark.parametrize(("backend", "controller"), [(b, c) for b, names in CONTROLLERS.items() for c in names])
+def test_a_robot_comes_to_stand_inside_the_area(tmp_path, backend, controller, area):
+    goal = MoveBaseGoal(Pose.planar(0.0, 0.0), controller=controller, goal_area=area, recovery_behaviors=())
+    result, pose = drive_to(tmp_path, backend, goal)
+    assert result.success, result
+    assert area.contains(pose)
+
+
+@pytest.mark.parametrize("backend", CONFIGS)
+@pytest.mark.parametrize("who_decides", ["the area", "the tolerances alone"])
+def test_a_goal_given_above_the_floor_is_reached_below_it(tmp_path, backend, who_decides):
+    above = Pose.planar(4.0, 3.5, z=0.3)
+    area = DiscArea(above, 0.25) if who_decides == "the area" else None
+    goal = MoveBaseGoal(above, goal_area=area, recovery_behaviors=())
+    result, pose = drive_to(tmp_path, backend, goal, mbf_tolerance_exclusive=area is None)
+    assert result.success, result
+    assert pose.distance_to(Pose.planar(4.0, 3.5)) < 0.25

@@ -1,5 +1,7 @@
 """How a controller execution arrives and reports; F-numbers are facts of the upstream tests, with their ids."""
 
+import math
+
 import pytest
 
 from mbf_abstract.drive.robot import Odometry
@@ -7,6 +9,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.arrival import ArrivalCheck
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.goals.goal_area import DiscArea, PoseSetArea
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome as Outcome
 from mbf_abstract.plugins import ControlResult
@@ -127,6 +130,35 @@ def test_a_pose_is_inside_the_tolerances_or_not(x, y, yaw, arrived):
 
 def test_f088_headings_are_compared_around_the_circle():
     assert ArrivalCheck(Pose.planar(0, 0, 3.14), 0.25, 0.25).within(Pose.planar(0, 0, -3.14), driven_to_its_end())
+
+
+SLOPE = Pose((0.0, 0.0, 0.0), (0.0, math.sin(-0.2), 0.0, math.cos(-0.2)))  # nose up by 0.4 rad
+
+
+@pytest.mark.parametrize(
+    ("pose", "goal", "arrived"),
+    [
+        (Pose.planar(0.0, 0.0), Pose.planar(0.0, 0.0, z=0.4), True),  # a goal above the ground, a robot below
+        (Pose.planar(0.0, 0.0, z=0.4), Pose.planar(0.0, 0.0), True),
+        (SLOPE, Pose.planar(0.0, 0.0), True),  # a goal that does not know the slope
+        (Pose.planar(0.0, 0.0), Pose.planar(0.3, 0.0, z=0.4), False),
+        (Pose.planar(0.0, 0.0), Pose.planar(0.0, 0.0, z=2.0), False),  # on another storey
+        (Pose.planar(0.0, 0.0), Pose.planar(0.0, 0.0, 0.3, z=0.4), False),
+    ],
+)
+@pytest.mark.parametrize("area", [False, True])
+def test_heights_and_slopes_that_the_goal_does_not_know_do_not_count(pose, goal, arrived, area):
+    around = PoseSetArea((goal,), 0.2499, 0.2499) if area else None
+    check = ArrivalCheck(goal, 0.25, 0.25, "exclusive", around)
+    assert check.reached(pose, driven_to_its_end(), plugin_agrees=True) is arrived
+
+
+def test_on_level_maps_no_height_counts():
+    goal = Pose.planar(0.0, 0.0, z=7.0)
+    for area in (None, DiscArea(goal, 0.25)):
+        level = ArrivalCheck(goal, 0.25, 0.25, "exclusive", area, same_storey=math.inf)
+        assert level.reached(Pose.planar(0.2, 0.0), driven_to_its_end(), False)
+        assert not level.reached(Pose.planar(0.3, 0.0), driven_to_its_end(), False)
 
 
 @pytest.mark.parametrize("velocity", [Twist.planar(1.0), Twist.planar(0.0, 1.0), Twist.planar(wz=1.0)])
