@@ -26,6 +26,17 @@ _SPECIAL = (
 )
 
 
+def named_file(folder: Path | str, name: Path | str) -> Path:
+    """The file that a configuration names: ``~`` is the home folder, other relative names count from ``folder``.
+
+    A name with ``~`` whose home folder is not known stays as it is: there is no such file, and its reader reports that.
+    """
+    try:
+        return Path(folder) / Path(name).expanduser()
+    except RuntimeError:
+        return Path(folder) / name
+
+
 class ArrayFileError(ValueError):
     """A file of arrays is damaged, or holds more than its reader's limit; the text does not name the file."""
 

@@ -13,10 +13,9 @@ map files in trinary mode give the same result as with it on.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
+from mbf_abstract.config.bounded_files import named_file
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.parameters import parameter
@@ -52,7 +51,7 @@ class StaticLayer(GridLayer):
         super().__init__(context)
         if self.parameters.map_file:
             self._map = load_costmap(
-                Path(context.base_folder) / self.parameters.map_file,
+                named_file(context.base_folder, self.parameters.map_file),
                 self.parameters.map_frame or context.frame_id,
                 context.track_unknown_space,
                 confined=context.confine_images,

@@ -26,6 +26,7 @@ from terrain.physics.actors import (
 )
 from terrain.physics.people import Person, Walls
 from terrain.physics.robot_models import ROBOTS
+from terrain.scenarios.obstacles import Size
 from terrain.scenarios.places import PlanarPose
 from terrain.scenarios.world import ScenarioWorld
 from terrain.worlds.occupancy import OccupancyGrid
@@ -78,7 +79,7 @@ class Door(ParameterModel):
     type: Literal["door"]
     opened: PlanarPose = parameter(..., "Middle of the leaf while it is open.")
     closed: PlanarPose = parameter(..., "Middle of the leaf when it is closed.")
-    size: tuple[float, float, float] = parameter((1.0, 0.1, 2.0), "Length, thickness, height.", unit="m")
+    size: Size = parameter((1.0, 0.1, 2.0), "Length, thickness, height.", unit="m")
     closes_at: float = parameter(..., "When it starts to close.", unit="s", ge=0.0)
     duration: float = parameter(2.0, "How long it takes to close.", unit="s", gt=0.0)
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
@@ -14,6 +15,9 @@ from terrain.physics.actors import AnyWorld
 from terrain.worlds.surface import Surface, box, cylinder, joined
 
 DRAWS_PER_POST = 100
+
+Length = Annotated[float, Field(gt=0.0)]
+Size = tuple[Length, Length, Length]
 
 
 class Obstacle(ParameterModel):
@@ -23,7 +27,7 @@ class Obstacle(ParameterModel):
     x: float = parameter(..., "Position of its middle.", unit="m")
     y: float = parameter(..., "Position of its middle.", unit="m")
     yaw: float = parameter(0.0, "Heading.", unit="rad")
-    size: tuple[float, float, float] = parameter((0.5, 0.5, 1.0), "Length, width, height; a cylinder's diameter.")
+    size: Size = parameter((0.5, 0.5, 1.0), "Length, width, height; a cylinder's diameter.", unit="m")
 
 
 class Forest(ParameterModel):

@@ -80,7 +80,7 @@ class ScenarioWorld:
         Raises
         ------
         ConfigError
-            The world has no place of this name, or no ground there.
+            The world has no place of this name, or no ground there: in a building, off its floor plan.
         """
         if isinstance(place, str):
             if place not in self.places:
@@ -88,7 +88,7 @@ class ScenarioWorld:
                 raise ConfigError([Finding("scenario", 1, "start or goals", f"a place of the world ({known})", place)])
             return self.places[place]
         z = self.height_at(place.x, place.y) if place.z is None else place.z
-        if not math.isfinite(z):
+        if not math.isfinite(z) or (self.grid is not None and not self.grid.covers(place.x, place.y)):
             expected, got = "a place on the ground of the world", f"({place.x:g}, {place.y:g})"
             raise ConfigError([Finding("scenario", 1, "start or goals", expected, got)])
         return Pose.planar(place.x, place.y, place.yaw, z)

@@ -46,6 +46,12 @@ class OccupancyGrid:
         x_max, y_max = self.origin_x + nx * self.resolution, self.origin_y + ny * self.resolution
         return self.origin_x, x_max, self.origin_y, y_max
 
+    def covers(self, x: float, y: float) -> bool:
+        """Whether (x, y) [m] lies within the bounds, or at most a cell off them."""
+        x_min, x_max, y_min, y_max = self.bounds
+        off = max(x_min - x, x - x_max, y_min - y, y - y_max)
+        return off <= self.resolution
+
     def is_free(self, x: float, y: float) -> bool:
         """Whether the cell at (x, y) [m] is known to be free."""
         ix = math.floor((x - self.origin_x) / self.resolution)

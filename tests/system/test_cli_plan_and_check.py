@@ -220,6 +220,21 @@ def test_check_finds_a_missing_map_file_of_a_configuration_without_mistakes(hill
     assert mbf("check", bad, "--no-load").exit_code == 0
 
 
+@pytest.mark.parametrize("backend", ["costmap", "mesh"])
+def test_a_tilde_in_the_name_of_a_map_is_the_home_folder(backend, half_known, hill, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(half_known.parent if backend == "costmap" else hill.parent))
+    section = {
+        "costmap": "global_costmap: {layers: [{name: walls, type: static}], walls: {map_file: ~FOLDER/half.png}}",
+        "mesh": "mesh_map: {mesh_file: ~FOLDER/hill.ply, layers: []}",
+    }[backend]
+    config = tmp_path / "server.yaml"
+    for folder, exit_code in (("", 0), ("nobody-of-this-name", 2)):
+        config.write_text(f"backend: {backend}\n" + section.replace("FOLDER", folder))
+        result = mbf("check", config)
+        assert result.exit_code == exit_code, result.output
+    assert str(tmp_path / "~nobody-of-this-name") in result.output
+
+
 def test_check_finds_a_choice_of_maps_where_there_is_one_only_without_loading_it(hill, tmp_path):
     file = tmp_path / "robot.yaml"
     text = "backend: mesh\nrecovery_behaviors: [{{name: clear, type: clear}}]\nclear: {{costmaps: {}}}\n"

@@ -78,6 +78,21 @@ def test_every_mistake_is_found_whatever_else_is_wrong(mistakes, tmp_path_factor
     assert len(report.findings) == len(mistakes)
 
 
+@pytest.mark.parametrize("place", ["{x: 280.3, y: 2.5}", "{x: 1.0, y: -0.5}", "{x: 60.0, y: 2.5, z: 0.0}"])
+def test_a_place_off_the_floor_plan_of_a_building_is_a_mistake(place, tmp_path):
+    mistakes = [("trial.yaml", "world", "{type: office}", ""), ("trial.yaml", "start", place, "")]
+    report = check_scenario(load_yaml(write(tmp_path, mistakes)))
+    assert found(report, tmp_path) == {("trial.yaml", "start")}
+    assert "a place on the ground of the world" in report.findings[0].text
+
+
+@pytest.mark.parametrize("size", ["[0.6, -0.8, 0.6]", "[0.0, 0.5, 1.0]"])
+def test_an_obstacle_without_extent_is_a_mistake(size, tmp_path):
+    obstacles = f"[{{x: 3.0, y: 2.5, size: {size}}}]"
+    report = check_scenario(load_yaml(write(tmp_path, [("trial.yaml", "obstacles", obstacles, "")])), load=False)
+    assert [key.startswith("obstacles[0].size") for _, key in found(report, tmp_path)] == [True]
+
+
 def test_places_maps_and_plugins_are_checked_in_the_world_together_with_the_rest(tmp_path):
     mistakes = [
         ("trial.yaml", "start", "{x: 60.0, y: 2.5}", ""),
