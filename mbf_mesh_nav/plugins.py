@@ -6,8 +6,9 @@ A planner for meshes derives ``MeshPlanner`` and finds its map in ``self.mesh_ma
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any
 
 from mbf_abstract.maps.navigation_map import MapContext, MapPlugin
 from mbf_abstract.plugins import AbstractController, AbstractPlanner, AbstractRecovery, AbstractRefiner
@@ -31,11 +32,20 @@ class MeshPlanner(MeshPlugin, AbstractPlanner):
     """Finds a path over the surface of a triangle mesh."""
 
 
-class MeshController(MeshPlugin, AbstractController):
-    """Follows a path over the surface of a triangle mesh."""
+class LocalMeshPlugin(MeshPlugin):
+    """What a controller and a recovery have in common: they look at the map around the robot."""
 
-    drives_on_part: ClassVar[bool] = True
-    """Whether the part of the mesh around the robot is enough for it, as on a map of tiles."""
+    @classmethod
+    def reach(cls, parameters: Any) -> float:
+        """How far [m] around the robot it looks at the map with some parameters; inf = unknown.
+
+        On a map of tiles it is given the part of the mesh that holds this at any time.
+        """
+        return math.inf
+
+
+class MeshController(LocalMeshPlugin, AbstractController):
+    """Follows a path over the surface of a triangle mesh."""
 
     @property
     def limit_factor(self) -> float:
@@ -43,7 +53,7 @@ class MeshController(MeshPlugin, AbstractController):
         return self.relaxation.slack(self.clock.now()).controller_factor
 
 
-class MeshRecovery(MeshPlugin, AbstractRecovery):
+class MeshRecovery(LocalMeshPlugin, AbstractRecovery):
     """Gets a robot on a triangle mesh out of trouble."""
 
 

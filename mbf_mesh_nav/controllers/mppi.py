@@ -105,6 +105,12 @@ class MPPIController(MeshController):
         self._ranks_of: tuple[int, float] = (-1, 0.0)  # version of the map and cost limit
         self._ranks: Float32Array = np.zeros(0, dtype=np.float32)
 
+    @classmethod
+    def reach(cls, parameters: MPPIParameters) -> float:
+        """To the end of the longest motion it tries, from a robot beside the surface."""
+        speed = max(parameters.max_vel_x, -parameters.min_vel_x)
+        return speed * parameters.time_steps * parameters.model_dt + parameters.max_surface_distance
+
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose in the map's frame; not one in reverse for a car that may not."""
         if len(path) == 0 or path.frame_id != self.mesh_map.frame_id:

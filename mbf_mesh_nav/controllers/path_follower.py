@@ -75,6 +75,12 @@ class PathFollower(MeshController):
 
     _approach: GoalApproach | None = None
 
+    @classmethod
+    def reach(cls, parameters: PathFollowerParameters) -> float:
+        """To the end of the path that is checked, from a robot beside it."""
+        ahead = parameters.obstacle_distance
+        return max(ahead + parameters.max_path_distance if ahead else 0.0, parameters.max_surface_distance)
+
     @property
     def turns_on_the_spot(self) -> bool:
         """Always true."""

@@ -55,7 +55,6 @@ class VectorFieldController(MeshController):
 
     Parameters = VectorFieldParameters
     parameters: VectorFieldParameters
-    drives_on_part = False
 
     _approach: GoalApproach | None = None
 

@@ -2,7 +2,8 @@
 
 Use it on the backend ``tiles``, it is the planner there. Costs are those of ``mesh.astar`` on the whole mesh, or above
 them by at most ``cost_tolerance`` where that can be proven; the message states which, see ``tiles.corridor_search``.
-Blocked is what the map's cost profile calls so, or what sensors have seen. Paths follow edges: see ``mesh.dijkstra``.
+Blocked is what the map's cost profile calls so, or what sensors have seen. A path over via points is planned on the
+map as it is at one moment, so its legs agree. Paths follow edges: see ``mesh.dijkstra``.
 """
 
 from __future__ import annotations
@@ -27,10 +28,12 @@ from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner, p
 from mbf_mesh_nav.mesh.topology import group_of_each
 from mbf_mesh_nav.search.leg_search import Leg
 from mbf_mesh_nav.search.surface_planner import named_poses, path_of_legs
-from mbf_mesh_nav.tiles.corridor_search import TiledPlan, failed_plan
+from mbf_mesh_nav.tiles.corridor_search import TiledPlan
 from mbf_mesh_nav.tiles.places import TilePlace
 from mbf_mesh_nav.tiles.planning import SURFACE_DISTANCE, TOLERANCE, place_on_tiles, plan_between
-from mbf_mesh_nav.tiles.serving.navigation_map import SEARCHED, TiledNavigationMap
+from mbf_mesh_nav.tiles.serving.moment import Moment
+from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
+from mbf_mesh_nav.tiles.serving.questions import SEARCHED
 
 AT_VERTEX = 1e-6
 """How far [m] a vertex may be from itself on the surface: rounding."""
@@ -66,13 +69,16 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Plan from start over the via points to the goal; see ``AbstractPlanner``. A damaged tile is a MAP_ERROR."""
         try:
-            return self._planned(request)
+            with self._map.turn_to_search(request.cancel_token.flag) as moment:
+                if moment is None:
+                    return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
+                return self._planned(request, moment)
         except MeshError as error:
             return PlanResult(GetPathOutcome.MAP_ERROR, str(error))
 
-    def _planned(self, request: PlanRequest) -> PlanResult:
+    def _planned(self, request: PlanRequest, moment: Moment) -> PlanResult:
         # 1. Where on the surface is everything? A tolerance helps with a problem of the goal only.
-        places, problem = self._locate(request)
+        places, problem = self._locate(request, moment)
         if problem is not None and (len(places) <= len(request.via) or request.dist_tolerance <= 0.0):
             return problem
 
@@ -87,7 +93,7 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
             plans.append(plan)
         near_goal = problem is not None and len(plans) == len(request.via) and request.dist_tolerance > 0.0
         if near_goal and not request.cancel_token.cancelled:
-            near = self._near_goal(places[len(plans)], request.goal, request.dist_tolerance, flag)
+            near = self._near_goal(places[len(plans)], request, moment)
             plans, problem = ([*plans, near], None) if near is not None else (plans, self._limited(problem, request))
 
         # 3. One path of all legs, ending with the requested pose.
@@ -107,36 +113,33 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         """How far [m] from a goal a place with a path is looked for at most."""
         return SEARCHED * self._tiled.index.spacing
 
-    def _locate(self, request: PlanRequest) -> tuple[list[TilePlace], PlanResult | None]:
+    def _locate(self, request: PlanRequest, moment: Moment) -> tuple[list[TilePlace], PlanResult | None]:
         """Places of start, via points and goal, in order, up to the first that has a problem; the problem."""
         places: list[TilePlace] = []
         for name, pose in named_poses(request):
-            with self._map.turn_to_search(request.cancel_token.flag) as has_turn:
-                if not has_turn:
-                    return places, PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
-                place = place_on_tiles(self._tiled, name, pose.position, self.parameters.max_surface_distance)
+            place = place_on_tiles(self._tiled, name, pose.position, self.parameters.max_surface_distance)
             if isinstance(place, TiledPlan):
-                return places, PlanResult(place.outcome, self._explained(place, name, pose))
+                return places, PlanResult(place.outcome, self._explained(place, name, pose, moment))
             places.append(place)
         return places, None
 
-    def _explained(self, problem: TiledPlan, name: str, pose: Pose) -> str:
+    def _explained(self, problem: TiledPlan, name: str, pose: Pose, moment: Moment) -> str:
         """The message of a pose that is blocked or not on the surface, with its layers or the heights there."""
         if problem.outcome == GetPathOutcome.OUT_OF_MAP:
             return f"{problem.message}; {heights_text(self._map.ground_heights(pose.x, pose.y))}"
         reach, limit = self.parameters.max_surface_distance, self._tiled.profile.cost_limit
-        there = self._map.around(pose.x, pose.y, min(reach, self._map.reach))
-        point = None if there is None else on_surface(there.topology, there.locator, pose.position, reach)
-        if there is None or point is None:
+        found = moment.around(pose.x, pose.y, min(reach, self._map.reach))
+        if found is None:
             return problem.message
-        reason = describe_blockage(there, there.snapshot(), nearest_corner(there, point), limit)
+        there, snapshot = found
+        point = on_surface(there.topology, there.locator, pose.position, reach)
+        if point is None:
+            return problem.message
+        reason = describe_blockage(there, snapshot, nearest_corner(there, point), limit)
         return f"the {name} {position_text(pose.position)} is blocked: {reason}"
 
     def _plan(self, first: TilePlace, last: TilePlace, flag: FlagArray) -> TiledPlan:
-        with self._map.turn_to_search(flag) as has_turn:
-            if not has_turn:
-                return failed_plan(GetPathOutcome.CANCELED, "")
-            return plan_between(self._tiled, first, last, tolerance=self.parameters.cost_tolerance, cancel_flag=flag)
+        return plan_between(self._tiled, first, last, tolerance=self.parameters.cost_tolerance, cancel_flag=flag)
 
     def _failed(self, plan: TiledPlan) -> PlanResult:
         """Of a plan that failed; on a map that no sensor changes, planning again does not help."""
@@ -150,17 +153,19 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         limit = f"a goal's tolerance counts up to {self._searched:.4g} m on this map of tiles"
         return replace(problem, message=f"{problem.message}; {limit}")
 
-    def _near_goal(self, start: TilePlace, goal: Pose, tolerance: float, flag: FlagArray) -> TiledPlan | None:
-        """Plan to the vertex with a path that is nearest to the goal, if one lies within the tolerance [m].
+    def _near_goal(self, start: TilePlace, request: PlanRequest, moment: Moment) -> TiledPlan | None:
+        """Plan to the vertex with a path that is nearest to the goal, if one lies within the request's tolerance.
 
         It is looked for at most ``SEARCHED`` distances between vertices away.
         """
-        within = min(tolerance, self._searched)
-        there = self._map.around(goal.x, goal.y, within)
-        if there is None:
+        goal, flag = request.goal, request.cancel_token.flag
+        within = min(request.dist_tolerance, self._searched)
+        found = moment.around(goal.x, goal.y, within)
+        if found is None:
             return None
+        there, snapshot = found
         # Free vertices that are connected have a path all or none: one of each group is tried.
-        free = ~there.snapshot().blocked(self._tiled.profile.cost_limit)
+        free = ~snapshot.blocked(self._tiled.profile.cost_limit)
         group = group_of_each(there.edges[free[there.edges].all(axis=1)].T, len(free))
         offsets = norm(there.vertices - np.asarray(goal.position))
         near = np.flatnonzero(free & (offsets <= within))
@@ -168,8 +173,7 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         for vertex in near[np.argsort(offsets[near], kind="stable")].tolist():
             if group[vertex] in without_path:
                 continue
-            with self._map.turn_to_search(flag) as has_turn:
-                place = self._tiled.find_place(there.vertices[vertex], AT_VERTEX) if has_turn else None
+            place = self._tiled.find_place(there.vertices[vertex], AT_VERTEX)
             plan = self._plan(start, place, flag) if place is not None else None
             if plan is not None and plan.outcome == GetPathOutcome.SUCCESS:
                 return plan

@@ -31,6 +31,9 @@ from mbf_mesh_nav.motion.goal_approach import clamp
 from mbf_mesh_nav.plugins import MeshRecovery
 from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, search_graph, seeded_arrays, threshold_step
 
+SURFACE_DISTANCE = 1.0
+"""A robot farther [m] from the surface is not on it."""
+
 
 class EscapeParameters(GuardedMotionParameters):
     """Parameters of ``mesh.escape``."""
@@ -70,12 +73,18 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
     Parameters = EscapeParameters
     parameters: EscapeParameters
 
+    @classmethod
+    def reach(cls, parameters: EscapeParameters) -> float:
+        """To the end of the longest path, from a robot beside the surface."""
+        return parameters.max_distance + SURFACE_DISTANCE
+
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Find the nearest free vertex, drive there; a free start is a success at once."""
         p, mesh_map, flag = self.parameters, self.mesh_map, request.cancel_token.flag
-        spot = mesh_map.locate_one(request.motion.pose().position, 1.0)
+        spot = mesh_map.locate_one(request.motion.pose().position, SURFACE_DISTANCE)
         if spot is None:
-            return RecoveryResult(RecoveryOutcome.FAILURE, "the robot is more than 1 m from the surface")
+            text = f"the robot is more than {SURFACE_DISTANCE:g} m from the surface"
+            return RecoveryResult(RecoveryOutcome.FAILURE, text)
         snapshot = mesh_map.snapshot()
         if not snapshot.blocked(p.cost_limit)[mesh_map.faces[spot.face]].any():
             return RecoveryResult(RecoveryOutcome.SUCCESS, "the robot stands on safe surface")
@@ -88,7 +97,7 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
             if way is not None:
                 way.tracker.update(pose.position)
                 if not way.is_open(_lethal(now) & ~own_patch, now.blocked(p.cost_limit)):
-                    here = mesh_map.locate_one(pose.position, 1.0)
+                    here = mesh_map.locate_one(pose.position, SURFACE_DISTANCE)
                     way = None if here is None else self._escape_path(here, own_patch, request)
             if way is None:
                 message = f"no safe surface within {p.max_distance:g} m over the surface"

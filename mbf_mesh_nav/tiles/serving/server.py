@@ -1,13 +1,15 @@
 """The server on a map of tiles.
 
 The configuration has one section, ``tiled_map``; its layers sense and come on top of those the tiles were built with.
-Plugin types are looked for with the prefix ``mesh.``, the planner is ``tiles.hierarchical``. Controllers for meshes
-drive on a window around the robot, other plugins for one mesh are refused.
+Plugin types are looked for with the prefix ``mesh.``, the planner is ``tiles.hierarchical``. Controllers and recoveries
+for meshes drive on a window around the robot, refiners for meshes see the part around their path, planners for one mesh
+are refused.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -28,10 +30,12 @@ from mbf_abstract.server.plugin_host import ServerError
 from mbf_mesh_nav.map.map_builder import MeshLayerEntry
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.plugins import MeshController, MeshPlugin
+from mbf_mesh_nav.plugins import MeshController, MeshPlugin, MeshRecovery, MeshRefiner
 from mbf_mesh_nav.tiles.index import is_tile_folder, read_index
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
+from mbf_mesh_nav.tiles.serving.path_refiner import PathRefiner
 from mbf_mesh_nav.tiles.serving.window_controller import WindowController
+from mbf_mesh_nav.tiles.serving.window_recovery import WindowRecovery
 from mbf_mesh_nav.tiles.serving.window_settings import WindowSettings, window_settings
 from mbf_mesh_nav.tiles.tiled_map import DEFAULT_MEMORY, TiledMap
 
@@ -42,9 +46,20 @@ planner_max_retries: 0
 planner_patience: 100.0
 planners:
   - {{name: hierarchical, type: tiles.hierarchical}}
+refiners:
+  - {{name: string_pulling, type: string_pulling}}
+plan_refiner: string_pulling
 tiled_map:
   folder: {folder}
 """
+
+
+ON_TILES: Mapping[type[MeshPlugin], Any] = {
+    MeshController: WindowController,
+    MeshRecovery: WindowRecovery,
+    MeshRefiner: PathRefiner,
+}
+"""What gives plugins for one mesh the part of the tiles that they need."""
 
 
 class TiledMapParameters(ParameterModel):
@@ -118,9 +133,10 @@ class TileServer(MapServer):
         tiled_map = TiledNavigationMap(tiled, parameters.inscribed_radius, parameters.max_turning_slope, window)
         yield ServedMap(tiled_map, self.runtime, "tiled_map", parameters, parameters.update_frequency)
 
-    @staticmethod
-    def _window(config: Config, parameters: TiledMapParameters, tiled: TiledMap) -> WindowSettings:
+    def _window(self, config: Config, parameters: TiledMapParameters, tiled: TiledMap) -> WindowSettings:
         layers = config.sections["tiled_map"].layers
+        speed = self.runtime.gate.limits.max_vel_x
+        driven = speed / parameters.update_frequency if math.isfinite(speed) else 0.0
         classes: dict[str, Any] = {layer.type_name: layer.layer_class for layer in layers}
         try:
             return window_settings(
@@ -131,6 +147,7 @@ class TileServer(MapServer):
                 parameters.default_layer,
                 parameters.inscribed_radius,
                 classes.__getitem__,
+                driven,
             )
         except LayerListError as error:
             raise LayerListError(f"{config.path}: tiled_map: {error}") from error
@@ -147,11 +164,12 @@ class TileServer(MapServer):
         return MapContext(**vars(base), navigation_map=self.tiled_map, transforms=transforms, scans=self.scans)
 
     def _construct(self, spec: PluginSpec) -> LoadedPlugin[Any]:
-        if issubclass(spec.plugin_class, MeshController) and spec.plugin_class.drives_on_part:
-            on_window: Any = partial(WindowController, spec.plugin_class)
-            loaded = super()._construct(replace(spec, plugin_class=on_window))
-            loaded.spec = spec
-            return loaded
+        for base, on_tiles in ON_TILES.items():
+            if issubclass(spec.plugin_class, base):
+                wrapped: Any = partial(on_tiles, spec.plugin_class)
+                loaded = super()._construct(replace(spec, plugin_class=wrapped))
+                loaded.spec = spec
+                return loaded
         if issubclass(spec.plugin_class, MeshPlugin):
             raise ServerError("needs the whole mesh in memory, which a map of tiles is not")
         return super()._construct(spec)

@@ -8,7 +8,8 @@ lies on both. What lies off the new one is forgotten, so memory is bounded by th
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,8 @@ from mbf_mesh_nav.tiles.serving.window_settings import MOVES_AT, SHOWN, WindowSe
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
 UNKNOWN_POSE = "the pose of the robot is unknown, so the window is not around it"
+TILES_CHANGED = "the tiles have changed, and the window has not been cut out of them again"
+LEFT = "the robot has left the window that a recovery drives on"
 
 
 class Window:
@@ -123,6 +126,7 @@ class FollowingWindow:
 
     Attributes
     ----------
+    settings : WindowSettings
     now : Window
         Until the robot's pose is known it lies anywhere on the surface.
 
@@ -133,8 +137,10 @@ class FollowingWindow:
     """
 
     def __init__(self, tiled: TiledMap, squares: Squares, settings: WindowSettings) -> None:
-        self._tiled, self._squares, self._settings = tiled, squares, settings
+        self._tiled, self._squares, self.settings = tiled, squares, settings
         self._problem = UNKNOWN_POSE if self.senses else ""
+        self._outdated = ""  # why it is not of the tiles of now
+        self._held = 0
         self._time: float | None = None  # of the last update [s]
         self._updating = threading.RLock()
         x, y, _ = squares.tile(tiled.index.tiles[0].key).vertices[0].tolist()
@@ -145,7 +151,7 @@ class FollowingWindow:
     @property
     def senses(self) -> bool:
         """Whether any layer of it does."""
-        return bool(self._settings.live)
+        return bool(self.settings.live)
 
     def update(self, robot: Pose | None, now: float) -> None:
         """Take in what sensors have seen up to ``now`` [s], on another window if the robot is too near the edge.
@@ -167,11 +173,23 @@ class FollowingWindow:
                 self._show(window)
 
     def stale_reason(self, now: float) -> str:
-        """Why it is not current at ``now`` [s]: not around the robot, a layer that raised, a silent sensor.
+        """Why it is not current at ``now`` [s].
 
-        Without layers that sense it only has to be around a robot whose pose is known and on the surface.
+        It is not around the robot, the tiles have changed, a layer raised, or a sensor is silent. Without layers that
+        sense it only has to be of the present tiles, around a robot whose pose is known and on the surface.
         """
-        return self._problem or self.now.map.stale_reason(now)
+        return self._problem or self._outdated or self.now.map.stale_reason(now)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Keep the window of now for the time of a ``with`` block; it is stale if the robot leaves it meanwhile."""
+        with self._updating:
+            self._held += 1
+        try:
+            yield
+        finally:
+            with self._updating:
+                self._held -= 1
 
     def cleared(self, clear: Callable[[MeshMap], list[str]]) -> list[str]:
         """What a function returns that clears layers; not while an update runs."""
@@ -180,18 +198,31 @@ class FollowingWindow:
 
     def set_layer_parameters(self, name: str, parameters: LayerParameters) -> None:
         """Give a layer of the configuration its parameters; ValueError for those of the tiles."""
-        if name not in self._settings.live:
+        if name not in self.settings.live:
             raise ValueError(f"the layer {name!r} has the values of the tiles, no parameter of it can change")
         with self._updating:
             self.now.map.set_layer_parameters(name, parameters)
 
     def renew(self) -> None:
-        """Cut it out again where it is, because the tiles have changed; raises as ``update``."""
+        """Cut it out again where it is, because the tiles have changed; stale until that succeeds, here or later.
+
+        Raises as ``update``.
+        """
         with self._updating:
-            self._show(self._opened(*self.now.middle, self.now) or self.now)
+            self._outdated = TILES_CHANGED
+            if self._held:
+                return
+            try:
+                made = self._opened(*self.now.middle, self.now)
+            except BaseException as error:
+                self._outdated = f"{TILES_CHANGED}: {error_text(error)}"
+                raise
+            self._show(made or self.now)
 
     def _show(self, window: Window) -> None:
         """Bring a window up to date and show it; one on which a layer raises is stale."""
+        if window is not self.now:
+            self._outdated = ""
         try:
             if self._time is not None:
                 window.map.update(None, self._time)
@@ -202,19 +233,21 @@ class FollowingWindow:
         """The window for a robot; the last one and a reason where there is none around it."""
         if robot is None:
             return self._kept(UNKNOWN_POSE)
-        if self.now.is_central(robot.x, robot.y):
+        if self._held:
+            return self._kept("" if self.now.holds(robot.x, robot.y, 0.0) else LEFT)
+        if self.now.is_central(robot.x, robot.y) and not self._outdated:
             return self._kept("")
         try:
-            moved = self._opened(robot.x, robot.y, self.now)
-            if moved is not None and self._time is not None and not self.now.holds(robot.x, robot.y, 0.0):
-                moved.map.clear()
+            made = self._opened(robot.x, robot.y, self.now)
+            if made is not None and self._time is not None and not self.now.holds(robot.x, robot.y, 0.0):
+                made.map.clear()
         except BaseException as error:
             self._problem = f"the window around the robot cannot be made: {error_text(error)}"
             raise
-        if moved is None:
+        if made is None:
             return self._kept(f"there is no surface around the robot at ({robot.x:.2f}, {robot.y:.2f})")
         self._problem = ""
-        return moved
+        return made
 
     def _kept(self, problem: str) -> Window:
         self._problem = problem if self.senses else ""
@@ -222,6 +255,6 @@ class FollowingWindow:
 
     def _opened(self, x: float, y: float, old: Window | None) -> Window | None:
         """A window around a place [m]; None where there is no surface."""
-        half = 0.5 * self._settings.side + BEYOND * self._tiled.index.spacing
+        half = 0.5 * self.settings.side + BEYOND * self._tiled.index.spacing
         found = self._squares.within((x - half, y - half), (x + half, y + half))
-        return None if found is None else Window(found, (x, y), self._settings, self._tiled.profile_layer, old)
+        return None if found is None else Window(found, (x, y), self.settings, self._tiled.profile_layer, old)

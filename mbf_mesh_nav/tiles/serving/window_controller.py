@@ -7,9 +7,6 @@ commands, such as ``mppi``, begin anew there, as they do with every new plan.
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import Any
-
 import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
@@ -17,8 +14,9 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.maps.navigation_map import MapContext
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult, PlannedMotion
-from mbf_mesh_nav.plugins import MeshContext, MeshController
+from mbf_mesh_nav.plugins import MeshController
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
+from mbf_mesh_nav.tiles.serving.parts import on_part
 
 
 class WindowController(AbstractController):
@@ -29,11 +27,17 @@ class WindowController(AbstractController):
     controller_class : type
     context : MapContext
         With a map of tiles that has a window.
+
+    Raises
+    ------
+    ValueError
+        The window is too small for it.
     """
 
     def __init__(self, controller_class: type[MeshController], context: MapContext[TiledNavigationMap]) -> None:
         super().__init__(context)
         self._class, self._context, self._map = controller_class, context, context.navigation_map
+        self._map.require_room(controller_class.reach(self.parameters))
         self._tracker: PathTracker | None = None
         self._accepted = True
         self._inner = self._made()
@@ -75,7 +79,8 @@ class WindowController(AbstractController):
         return self._inner.planned_motion()
 
     def parameters_changed(self) -> None:
-        """Hand them on; those that the controller refuses are not kept."""
+        """Hand them on; those that the controller refuses, or with which it looks beyond the window, are not kept."""
+        self._map.require_room(self._class.reach(self.parameters))
         old, self._inner.parameters = self._inner.parameters, self.parameters
         try:
             self._inner.parameters_changed()
@@ -96,9 +101,7 @@ class WindowController(AbstractController):
         return self._inner
 
     def _made(self) -> MeshController:
-        given: dict[str, Any] = {field.name: getattr(self._context, field.name) for field in fields(self._context)}
-        given.update(navigation_map=self._map.window_map, maps={}, parameters=self.parameters)
-        return self._class(MeshContext(**given))
+        return on_part(self._class, self._context, self.parameters, self._map.window_map)
 
 
 def _left(tracker: PathTracker) -> Path:

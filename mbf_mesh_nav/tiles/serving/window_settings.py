@@ -36,11 +36,27 @@ class WindowSettings:
         All layers of a window, inputs first; empty = the stored ones only.
     live : frozenset of str
         Names of those that the configuration lists.
+    reach : float
+        How far [m] they look around a vertex.
+    driven : float
+        How far [m] the robot drives at most between two updates.
     """
 
     side: float
     planned: tuple[PlannedLayer[MeshLayer], ...] = ()
     live: frozenset[str] = frozenset()
+    reach: float = 0.0
+    driven: float = 0.0
+
+    def require_room(self, looks: float) -> None:
+        """ValueError unless a window always holds all on which ``looks`` [m] around the robot depend."""
+        needed = (looks + self.reach + self.driven) / MOVES_AT
+        if needed >= self.side:
+            raise ValueError(
+                f"tiled_map.window: expected more than {needed:.4g} m, got {self.side:g} m; with its parameters it "
+                f"looks {looks:.4g} m around the robot, which drives {self.driven:.3g} m between updates, and the "
+                f"layers look {self.reach:.4g} m around a vertex"
+            )
 
 
 def window_settings(
@@ -51,6 +67,7 @@ def window_settings(
     default_layer: str = "",
     inscribed_radius: float = 0.0,
     load_layer: LayerLoader | None = None,
+    driven: float = 0.0,
 ) -> WindowSettings:
     """Check the layers of a configuration against those of the tiles.
 
@@ -63,6 +80,8 @@ def window_settings(
         layer takes its place.
     default_layer : str
         The layer that counts beside that of the map's profile; empty = the last one of ``entries``.
+    driven : float
+        How far [m] the robot drives at most between two updates.
 
     Raises
     ------
@@ -70,7 +89,7 @@ def window_settings(
         With all findings.
     """
     if not entries:
-        return WindowSettings(side)
+        return WindowSettings(side, driven=driven)
     live = frozenset(entry.name for entry in entries)
     profile_layer = tiled.profile_layer
     built = AS_BUILT.format(profile_layer) if profile_layer in live else profile_layer
@@ -88,7 +107,7 @@ def window_settings(
         findings.append(f"default_layer {default!r}: expected one of the listed layers, {', '.join(sorted(live))}")
     if findings:
         raise LayerListError("; ".join(findings))
-    return WindowSettings(side, tuple(plan), live)
+    return WindowSettings(side, tuple(plan), live, reach_of(plan), driven)
 
 
 def _senseless(plan: Sequence[PlannedLayer[MeshLayer]], live: frozenset[str]) -> list[str]:

@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -30,3 +31,11 @@ def tiled_hills(hills, tmp_path_factory):
     folder = tmp_path_factory.mktemp("tiles") / "hills"
     build_tiles(HeightSource(hills, SPACING, SPACING), folder, settings())
     return folder
+
+
+@pytest.fixture(scope="module")
+def way(whole_hills):
+    """Free vertices (n, 3) along a line from one corner of the hills towards the other, about every metre."""
+    free = whole_hills.map.vertices[~whole_hills.blocked]
+    line = np.column_stack([np.linspace(6.0, 42.0, 37), np.linspace(8.0, 40.0, 37)])
+    return np.array([free[np.argmin(((free[:, :2] - place) ** 2).sum(axis=1))] for place in line])

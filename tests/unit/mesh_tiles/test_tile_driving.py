@@ -78,14 +78,17 @@ def test_a_drive_over_three_borders_of_tiles_ends_as_on_the_whole_mesh(folder):
         assert "the surface ends" in result.message
 
 
-@pytest.mark.parametrize(("controller", "block"), [("path_follower", ""), ("mppi", "follower: {batch_size: 100}")])
+@pytest.mark.parametrize(
+    ("controller", "block"),
+    [("path_follower", "follower: {obstacle_distance: 2.7}"), ("mppi", "follower: {batch_size: 100}")],
+)
 def test_a_controller_for_meshes_drives_from_window_to_window_as_on_the_whole_mesh(folder, controller, block):
-    """Windows of 12 m move on every 3 m."""
+    """Windows of 16 m move on every 4 m; the controllers look nearly as far ahead."""
     path = Path.from_points(np.linspace(START.position, (13.0, 2.4, 0.0), 60))
     for backend in ("tiles", "mesh"):
         text = (folder / f"{backend}.yaml").read_text("utf-8").replace("follow_path", controller)
         text = text.replace("follower: {max_vel_x: 2.0, decel_lim_x: 2.0}", block).replace(
-            "{folder", "{window: 12.0, folder"
+            "{folder", "{window: 16.0, folder"
         )
         (folder / f"{backend}_{controller}.yaml").write_text(text, "utf-8")
     goals = [ExePathGoal(path), MoveBaseGoal(Pose.planar(20.0, 2.0))]

@@ -5,117 +5,29 @@ import shutil
 
 import numpy as np
 import pytest
-from test_tile_server import config, planned, pose, serve
-from tiled_terrains import BLOCKS, PARAMETERS, SPACING, WholeMap
+from sensing_tiles import (
+    ENTRIES,
+    SENSING,
+    SIDE,
+    SensingWhole,
+    above_ground,
+    assert_same_costs,
+    drive,
+    scan,
+    sensing_map,
+)
+from test_tile_server import pose
+from tiled_terrains import SPACING
 
-from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.maps.layers.layer_list import LayerListError
-from mbf_abstract.maps.map_queries import check_path
-from mbf_abstract.maps.queries import CellState, PlaceQuery
-from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.plugins import PlanRequest
-from mbf_abstract.testing.loopback import LoopbackSession
-from mbf_mesh_nav.layers.obstacle import ObstacleLayer, ObstacleParameters
-from mbf_mesh_nav.map.layer import MeshLayer
+from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.queries import CellState
+from mbf_mesh_nav.layers.obstacle import ObstacleLayer
 from mbf_mesh_nav.map.map_builder import MeshLayerEntry
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.planners.hierarchical import HierarchicalPlanner
-from mbf_mesh_nav.tiles.planning import plan_on_tiles
-from mbf_mesh_nav.tiles.sensed import SensedCosts
-from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
-from mbf_mesh_nav.tiles.serving.window_settings import MOVES_AT, SHOWN, window_settings
+from mbf_mesh_nav.tiles.serving.window_settings import MOVES_AT
 from mbf_mesh_nav.tiles.tile import tile_file
-from mbf_mesh_nav.tiles.tiled_map import TiledMap
-
-SIDE = 16.0
-RADIUS = BLOCKS["inflation"]["inflation_radius"]
-ENTRIES = (
-    MeshLayerEntry(name="obstacles", type="obstacle"),
-    MeshLayerEntry(name="around", type="inflation", inputs=("obstacles",)),
-)
-SENSING = {
-    "obstacles": {"sources": ("lidar",), "decay_time": np.inf, "clearing": False},
-    "around": {"inscribed_radius": 0.3, "inflation_radius": RADIUS, "lethal_value": np.inf},
-}
-OBSTACLES = """  window: 16.0
-  layers: [{name: obstacles, type: obstacle}, {name: around, type: inflation, inputs: [obstacles]}]
-  obstacles: {sources: [lidar]}
-  around: {inscribed_radius: 0.3, inflation_radius: 0.8, lethal_value: .inf}
-"""
-NEAR = PlaceQuery(safety_dist=1.0)
-SENSING_OFF = ObstacleParameters(sources=("lidar",), enabled=False)
 
 
-def sensing_map(folder, blocks=SENSING, side=SIDE, entries=ENTRIES, **more):
-    tiled = TiledMap(folder, **more)
-    return TiledNavigationMap(tiled, window=window_settings(tiled, side, entries, blocks))
-
-
-class SensingWhole(WholeMap):
-    """The naive twin: the whole mesh with the same layers, and the same combination of stored and sensed ones."""
-
-    def __init__(self, heights, blocks=SENSING, entries=ENTRIES):
-        entries = (*entries, MeshLayerEntry(name=SHOWN, type="max_combination", inputs=("safe", "around")))
-        parameters = PARAMETERS.model_copy(update={"layers": (*PARAMETERS.layers, *entries)})
-        super().__init__(heights, parameters, {**BLOCKS, **blocks})
-        self.place = {tuple(position): number for number, position in enumerate(self.map.vertices.tolist())}
-
-    def look(self):
-        """Plan and answer on the map as it is now."""
-        self.snapshot = self.map.snapshot()
-        self.blocked = self.snapshot.blocked(1.0)
-
-
-@pytest.fixture(scope="module")
-def way(whole_hills):
-    """Free vertices (n, 3) along a line from one corner of the hills towards the other, about every metre."""
-    free = whole_hills.map.vertices[~whole_hills.blocked]
-    line = np.column_stack([np.linspace(6.0, 42.0, 37), np.linspace(8.0, 40.0, 37)])
-    return np.array([free[np.argmin(((free[:, :2] - place) ** 2).sum(axis=1))] for place in line])
-
-
-def scan(robot, points, stamp):
-    return RangeScan.of_points("lidar", points, np.add(robot, (0.0, 0.0, 0.5)), stamp, "map")
-
-
-def boxes_around(robot, rng, whole, count=3, reach=3.5):
-    """Points above the surface around a robot, as of small boxes: as far as any window reaches."""
-    middles = robot[:2] + rng.uniform(-reach, reach, (count, 2))
-    xy = (middles[:, None] + rng.uniform(-0.3, 0.3, (count, 6, 2))).reshape(-1, 2)
-    return above_ground(whole, xy, 0.6)
-
-
-def above_ground(whole, xy, height):
-    """Points (n, 3) so high above the surface, but none over a hole."""
-    sky = np.column_stack([xy, np.full(len(xy), 50.0)])
-    faces, depths = whole.map.locator.cast_rays(sky, (0.0, 0.0, -1.0))
-    return (sky - np.column_stack([0.0 * xy, depths - height]))[faces >= 0]
-
-
-def drive(tiled, whole, way, seed=0):
-    """Show both maps the same along a way; yields after each step."""
-    rng = np.random.default_rng(seed)
-    for step, robot in enumerate(way):
-        seen = scan(robot, boxes_around(robot, rng, whole), float(step))
-        for one in (tiled, whole.map):
-            one.insert_scan(seen)
-            one.update(pose(robot), float(step))
-        yield robot
-
-
-def assert_same_costs(tiled, whole, margin=RADIUS + SPACING):
-    """In the window, but for what lies within the layers' reach of its edge, costs are those of the whole mesh."""
-    window = tiled.window_map
-    inner = np.abs(window.vertices[:, :2] - tiled._window.now.middle).max(axis=1) < 0.5 * SIDE - margin
-    order = np.array([whole.place[tuple(position)] for position in window.vertices.tolist()])[inner]
-    ours, exact = window.snapshot(), whole.map.snapshot()
-    assert np.array_equal(ours.lethal[inner], exact.lethal[order])
-    assert np.allclose(ours.costs[inner], exact.costs[order], rtol=1e-6)
-    return int((window.layers["around"].costs[inner] > 0.0).sum())
-
-
-# --------------------------------------------------------------------------------------------------- intake
 def test_along_a_drive_the_window_has_the_costs_of_the_whole_mesh_with_all_that_was_seen(tiled_hills, hills, way):
     tiled, whole = sensing_map(tiled_hills), SensingWhole(hills)
     windows, raised = set(), 0
@@ -263,232 +175,49 @@ def test_on_tiles_that_have_changed_predictions_stay_and_a_layer_that_raises_is_
         assert "broken" in tiled.stale_reason(1.0)
 
 
-# --------------------------------------------------------------------------------------------------- questions
-def test_questions_in_the_window_have_the_answers_of_the_whole_mesh(tiled_hills, hills, way):
-    tiled, whole = sensing_map(tiled_hills), SensingWhole(hills)
-    for _ in drive(tiled, whole, way[:20]):
-        pass
-    whole.map.inscribed_radius = tiled.inscribed_radius
-    near = np.abs(whole.map.vertices[:, :2] - tiled._window.now.middle).max(axis=1)
-    rng, asked = np.random.default_rng(5), 0
-    places = whole.map.vertices[rng.permutation(np.flatnonzero(near < 0.5 * SIDE - RADIUS - 3.0 * SPACING))[:60]]
-    for place in places:
-        there = pose(place)
-        for query in (PlaceQuery(), PlaceQuery(safety_dist=0.4)):
-            ours, exact = tiled.pose_check(query)(there), whole.map.pose_check(query)(there)
-            assert ours.state == exact.state and ours.cost == pytest.approx(exact.cost, rel=1e-5, nan_ok=True)
-        ours, exact = tiled.point_check()(there), whole.map.point_check()(there)
-        assert ours.state == exact.state
-        asked += exact.state == CellState.LETHAL
-    assert asked > 5
-    for above in (np.add(places, (0.01, 0.02, 3.0)), np.add(way[-1:], (0.0, 0.0, 3.0))):  # and far out of the window
-        assert tiled.heights_below(above) == pytest.approx(whole.map.heights_below(above), nan_ok=True)
-
-
-def pairs_over_the_edge(tiled, whole, way):
-    """For windows along the way: where the robot is, and places (3,) just within and just beyond its right edge."""
-    for robot in way:
-        tiled.update(pose(robot), 0.0)
-        x, y = tiled._window.now.middle
-        x += 0.5 * SIDE
-        for offset in np.arange(-6.0, 6.0, 0.5):
-            pair = above_ground(whole, np.array([(x - 0.3, y + offset), (x + 0.4, y + offset)]), 0.0)
-            if len(pair) == 2 and tiled.pose_check(NEAR)(pose(pair[1])).state == CellState.FREE:
-                yield robot, *pair
-
-
-def test_a_place_beyond_the_edge_sees_what_was_sensed_within_it(tiled_hills, whole_hills, way):
-    tiled = sensing_map(tiled_hills)
-    robot, ground, place = next(pairs_over_the_edge(tiled, whole_hills, way))
-    beyond = pose(place)
-    before = tiled.pose_check(NEAR)(beyond)
-    tiled.insert_scan(scan(robot, ground[None] + (0.0, 0.0, 0.4), 0.1))
-    tiled.update(pose(robot), 0.1)
-    after = tiled.pose_check(NEAR)(beyond)
-    assert (before.state, after.state) == (CellState.FREE, CellState.LETHAL)
-    path = Path.from_points(np.array([beyond.position, ground]))
-    assert check_path(tiled.pose_check(PlaceQuery()), path).state == CellState.LETHAL
-    assert tiled.nearest_obstacle(beyond, 3.0) is not None
-    tiled.clear()
-    assert tiled.pose_check(NEAR)(beyond) == before
-
-
-def test_a_check_of_many_places_is_that_of_one_map(tiled_hills, whole_hills, way):
-    """Places within the window and beyond its edge; another search asks about what has been seen since."""
-    tiled = sensing_map(tiled_hills)
-    robot, ground, place = next(pairs_over_the_edge(tiled, whole_hills, way))
-    within, beyond = pose(ground), pose(place)
-    before, points = tiled.pose_check(NEAR), tiled.point_check()
-    expected = before(within), before(beyond), points(within)
-    around = tiled.around(beyond.x, beyond.y, 2.0)
-    costs = around.snapshot().costs.copy()
-    tiled.insert_scan(scan(robot, ground[None] + (0.0, 0.0, 0.4), 0.1))
-    tiled.update(pose(robot), 0.1)
-    after = tiled.pose_check(NEAR)
-    assert after(within).state == after(beyond).state == CellState.LETHAL != expected[1].state
-    assert (before(within), before(beyond), points(within)) == expected
-    assert after(beyond).state == CellState.LETHAL
-    assert np.array_equal(around.snapshot().costs, costs)
-
-
-# --------------------------------------------------------------------------------------------------- plans
-def test_plans_cost_what_they_cost_on_the_whole_mesh_with_all_that_was_seen(tiled_hills, hills, whole_hills, way):
-    """The way leads over borders of tiles; a small memory makes tiles go and come back with their sensed costs."""
-    probe = TiledMap(tiled_hills)
-    memory = probe.table_bytes + (4 + 9.5) * probe.pool.slot_bytes
-    tiled, whole = sensing_map(tiled_hills, side=100.0, memory=memory), SensingWhole(hills)
-    compared = 0
-    for step, robot in enumerate(drive(tiled, whole, way, seed=2)):
-        if step % 4:
-            continue
-        whole.look()
-        goal = way[min(step + 9, len(way) - 1)]
-        exact = whole.cost(robot, goal)
-        (ours,) = planned(HierarchicalPlanner, tiled, PlanRequest(pose(robot), pose(goal)))
-        assert not ours.permanent
-        if ours.outcome == GetPathOutcome.SUCCESS:
-            assert exact * (1.0 - 1e-5) <= ours.cost <= 1.03 * exact
-            corners = [whole.map.locate_one(point) for point in ours.path.positions[1:-1]]
-            assert not any(whole.blocked[whole.map.faces[one.face][np.argmax(one.barycentric)]] for one in corners)
-            compared += exact > 1.001 * whole_hills.cost(robot, goal)
-        else:
-            assert np.isinf(exact) or ours.outcome != GetPathOutcome.NO_PATH_FOUND
-    assert compared >= 3, "obstacles have to matter"
-
-
-def test_a_plan_after_clearing_is_the_one_from_before(tiled_hills, whole_hills, way):
-    tiled = sensing_map(tiled_hills)
-    request = PlanRequest(pose(way[10]), pose(whole_hills.free_places(1, 4)[0]))
-    tiled.update(pose(way[10]), 0.0)
-    (before,) = planned(HierarchicalPlanner, tiled, request)
-    middle = before.path.positions[len(before.path) // 8]
-    tiled.insert_scan(scan(way[10], middle[None] + (0.0, 0.0, 0.4), 0.1))
-    tiled.update(pose(way[10]), 0.1)
-    (around,) = planned(HierarchicalPlanner, tiled, request)
-    tiled.clear()
-    (after,) = planned(HierarchicalPlanner, tiled, request)
-    assert around.cost > before.cost and after.cost == before.cost
-    assert np.array_equal(after.path.positions, before.path.positions)
-
-
-def test_a_tile_that_changes_keeps_what_was_sensed_on_it(tiled_hills, way, tmp_path):
-    tiled = sensing_map(shutil.copytree(tiled_hills, tmp_path / "map"))
-    tiled.update(pose(way[10]), 0.0)
-    tiled.insert_scan(scan(way[10], way[12][None] + (0.0, 0.0, 0.4), 0.1))
-    tiled.update(pose(way[10]), 0.1)
-    request = PlanRequest(pose(way[10]), pose(way[12]))
-    (blocked,) = planned(HierarchicalPlanner, tiled, request)
-    key = tuple((way[12][:2] // 12.0).astype(int))
-    tile = tiled.tiled.tile(key)[0]
-    row = tiled.tiled.index.layers.index("safe")
-    for _ in range(2):
-        tiled.change_layer(key, "safe", tile.costs[row].copy(), tile.lethal[row].copy())
-    (still,) = planned(HierarchicalPlanner, tiled, request)
-    assert blocked.outcome == still.outcome == GetPathOutcome.BLOCKED_GOAL
-    assert "lethal in layer obstacles, around, shown" in still.message
-    assert tiled.point_check()(pose(way[12])).state == CellState.LETHAL
-
-
-def test_a_tile_that_cannot_be_read_again_takes_no_obstacle_out_of_the_plan(tiled_hills, whole_hills, tmp_path):
-    """What was seen on one tile is forgotten while its file is damaged, and something is seen on another one."""
+@pytest.mark.parametrize("senses", [True, False])
+def test_a_window_of_tiles_that_have_changed_holds_the_robot_until_it_is_cut_out_again(
+    tiled_hills, way, tmp_path, senses
+):
+    """A neighbour of the changed tile cannot be read; it is there again before the next update."""
     folder = shutil.copytree(tiled_hills, tmp_path / "map")
-    tiled, fresh = TiledMap(folder), TiledMap(folder)
-    places = whole_hills.map.vertices[~whole_hills.blocked]
-    start, goal = (places[np.argmin(((places[:, :2] - xy) ** 2).sum(axis=1))] for xy in ((6.0, 8.0), (30.0, 30.0)))
-    before = plan_on_tiles(tiled, start, goal)
-    first, second = (seen_on_tiles(tiled, before.positions[len(before.positions) // share]) for share in (8, 2))
-    tiled.lay_over(first)
-    plan_on_tiles(tiled, start, goal)
-    ((key, _),) = tiled._raised.items()
-    tiled._kept.clear()
-    sound = tile_file(folder, key).read_bytes()
-    tile_file(folder, key).write_bytes(b"none")
-    with contextlib.suppress(MeshError):
-        tiled.lay_over(second)
-    tile_file(folder, key).write_bytes(sound)
-    for one in (tiled, fresh):
-        one.lay_over(second)
-    ours, exact = (plan_on_tiles(one, start, goal) for one in (tiled, fresh))
-    assert ours.cost == exact.cost != before.cost and np.array_equal(ours.positions, exact.positions)
+    tiled = sensing_map(folder, entries=ENTRIES if senses else ())
+    tiled.update(pose(way[10]), 0.0)
+    if senses:
+        tiled.insert_scan(scan(way[10], way[12][None] + (0.0, 0.0, 0.4), 0.0))
+        tiled.update(pose(way[10]), 0.0)
+    key, beside = (1, 1), (1, 2)
+    tile = tiled.tiled.tile(key)[0]
+    lethal = np.ones(tile.core_vertices, dtype=np.bool_)
+    closed = np.full(len(lethal), np.inf, dtype=np.float32)
+    assert not tiled.stale_reason(0.0) and tiled.window_map.snapshot().lethal.mean() < 0.5
+    sound = tile_file(folder, beside).read_bytes()
+    tile_file(folder, beside).write_bytes(b"none")
+    with pytest.raises(MeshError):
+        tiled.change_layer(key, "safe", closed, lethal)
+    for robot in (None, pose(way[10])):
+        with contextlib.suppress(MeshError):
+            tiled.update(robot, 0.1)
+        assert tiled.stale_reason(0.1)
+    assert "tile_1_2.npz" in tiled.stale_reason(0.1)
+    tile_file(folder, beside).write_bytes(sound)
+    tiled.update(pose(way[10]), 0.2)
+    assert not tiled.stale_reason(0.2)
+    known = {tuple(position) for position in tile.vertices[: tile.core_vertices].tolist()}
+    window = tiled.window_map
+    changed = [tuple(position) in known for position in window.vertices.tolist()]
+    assert any(changed) and window.snapshot().lethal[changed].all()
 
 
-def seen_on_tiles(tiled, place):
-    """Lethal vertices within 0.8 m of a place, as a window would find them."""
-    reach = 0.8
-    box = (*(place - reach).tolist(), *(place + reach).tolist())
-    (core,) = (
-        (tile.numbers[: tile.core_vertices], tile.vertices[: tile.core_vertices])
-        for tile in (tiled.tile(key)[0] for key in tiled.index.tiles_in(box))
-        if (tile.vertices[: tile.core_vertices] == place).all(axis=1).any()
-    )
-    numbers, vertices = core
-    near = np.flatnonzero(((vertices - place) ** 2).sum(axis=1) < reach**2)
-    values = np.full(len(near), np.inf, dtype=np.float32), np.ones(len(near), dtype=np.bool_)
-    return SensedCosts.at(numbers[near], *values, vertices[near])
-
-
-# --------------------------------------------------------------------------------------------------- settings
-def test_a_layer_takes_the_place_of_the_stored_one_of_its_name_and_adds_to_it(tiled_hills, whole_hills):
-    entries = (*ENTRIES, MeshLayerEntry(name="safe", type="max_combination", inputs=("around",)))
-    tiled = TiledMap(tiled_hills)
-    over = TiledNavigationMap(tiled, window=window_settings(tiled, SIDE, entries, SENSING))
-    assert {"safe", "safe as built", SHOWN} <= set(over.layers)
-    stored, shown = over.layers["safe as built"], over.window_map.snapshot()
-    assert stored.lethal.any() and np.array_equal(stored.lethal, shown.lethal)
-    assert np.array_equal(stored.costs, shown.costs) and not over.layers["safe"].lethal.any()
-
-
-@pytest.mark.parametrize(
-    ("text", "finding"),
-    [
-        ("layers: [{name: rim, type: border}]", "layer 'rim' takes no scans and reads no layer that does"),
-        ("layers: [{name: a, type: inflation, inputs: [safe]}]", "layer 'a' takes no scans and reads no layer that"),
-        (
-            "layers: [{name: o, type: obstacle}]\n  default_layer: safe",
-            "default_layer 'safe': expected one of the list",
-        ),
-        ("layers: [{name: o, type: obstacle}]\n  default_layer: x", "default_layer 'x' is no layer"),
-        ("layers: [{name: shown, type: obstacle}]", "layer name 'shown' is used twice"),
-        ("layers: [{name: o, type: obstacle}, {name: i, type: inflation, inputs: [p]}]", "i reads unknown layer 'p'"),
-        (
-            "layers: [{name: o, type: obstacle}, {name: i, type: inflation, inputs: [o]}]\n"
-            "  window: 4.0\n  i: {inflation_radius: 1.5}",
-            "the layers look 1.5 m around a vertex, a window of 4 m leaves 1 m around the robot: expected a window of "
-            "more than 6 m",
-        ),
-    ],
-)
-def test_layers_that_do_not_belong_in_a_window_are_refused_at_the_start(tiled_hills, tmp_path, text, finding):
-    with LoopbackSession(Pose.planar(0.0, 0.0)) as session, pytest.raises(LayerListError) as caught:
-        serve(session, tmp_path, config(tiled_hills, block=f"  {text}\n"))
-    assert finding in str(caught.value) and "robot.yaml: tiled_map: " in str(caught.value)
-
-
-def test_a_layer_that_would_lose_its_obstacles_when_the_window_moves_is_refused(tiled_hills):
-    class Forgetful(ObstacleLayer):
-        take_over = MeshLayer.take_over
-
-    tiled, entry = TiledMap(tiled_hills), MeshLayerEntry(name="mine", type="forgetful")
-    with pytest.raises(LayerListError, match="layer 'mine' takes scans and does not override 'take_over'"):
-        window_settings(tiled, SIDE, (entry,), {}, load_layer=lambda name: Forgetful)
-
-
-def test_parameters_of_sensing_layers_change_and_last_those_of_the_tiles_do_not(tiled_hills, way, tmp_path):
-    with LoopbackSession(pose(way[0])) as session:
-        server = serve(session, tmp_path, config(tiled_hills, block=OBSTACLES))
-        server.set_layer_parameters("around", inflation_radius=1.0)
-        server.tiled_map.set_layer_parameters("obstacles", SENSING_OFF, until=5.0)
-        server.tiled_map.update(pose(way[14]), 1.0)
-        assert server.tiled_map.layers["around"].parameters.inflation_radius == 1.0
-        assert not server.tiled_map.layers["obstacles"].parameters.enabled
-        server.tiled_map.update(pose(way[14]), 5.0)
-        assert server.tiled_map.layers["obstacles"].parameters.enabled
-        with pytest.raises(ValueError, match="'steepness' has the values of the tiles"):
-            server.set_layer_parameters("steepness", enabled=False)
-
-
-def test_a_map_without_layers_of_its_own_has_nothing_to_clear_and_is_never_stale(tiled_hills, way, tmp_path):
-    with LoopbackSession(pose(way[0])) as session:
-        server = serve(session, tmp_path, config(tiled_hills))
-        assert server.tiled_map.clear() == [] and not server.map_problem() and not server.tiled_map.senses
-        assert tuple(server.tiled_map.layers) == server.tiled_map.tiled.index.layers
+def test_a_window_that_is_held_stays_until_it_is_released_and_is_stale_when_the_robot_has_left_it(tiled_hills, way):
+    tiled = sensing_map(tiled_hills)
+    tiled.update(pose(way[0]), 0.0)
+    tiled.insert_scan(scan(way[0], way[2][None] + (0.0, 0.0, 0.4), 0.0))
+    tiled.update(pose(way[0]), 0.0)
+    held = tiled.window_map
+    with tiled.held_window():
+        for robot, is_in in ((way[6], True), (way[20], False), (way[6], True)):
+            tiled.update(pose(robot), 0.1)
+            assert tiled.window_map is held and bool(tiled.stale_reason(0.1)) is not is_in
+    tiled.update(pose(way[6]), 0.2)
+    assert tiled.window_map is not held and not tiled.stale_reason(0.2)

@@ -236,12 +236,17 @@ def test_the_picture_shows_the_highest_cost_of_every_pixel(tiled_hills, whole_hi
         ("  memory: 1000\n", "", MeshError, "MB of memory, allowed are 0.001 MB"),
         ("", "global_frame: odom\n", MeshError, "in the frame 'map', the global_frame of the configuration is 'odom'"),
         ("", "controllers: [{name: field, type: vector_field}]\n", ServerError, "needs the whole mesh in memory"),
-        ("", "refiners: [{name: pull, type: string_pulling}]\n", ServerError, "needs the whole mesh in memory"),
     ],
 )
 def test_what_does_not_fit_the_map_is_refused_at_the_start(tiled_hills, tmp_path, block, more, error, text):
     with LoopbackSession(Pose.planar(0.0, 0.0)) as session, pytest.raises(error, match=text):
         serve(session, tmp_path, config(tiled_hills, more, block))
+
+
+def test_planners_for_one_mesh_are_refused_at_the_start(tiled_hills, tmp_path):
+    text = config(tiled_hills).replace("tiles.hierarchical", "cvp")
+    with LoopbackSession(Pose.planar(0.0, 0.0)) as session, pytest.raises(ServerError, match="needs the whole mesh"):
+        serve(session, tmp_path, text)
 
 
 def test_the_planner_is_refused_on_another_map(whole_hills):

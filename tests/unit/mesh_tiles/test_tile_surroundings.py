@@ -63,8 +63,8 @@ def test_a_goal_that_waits_for_the_search_of_another_one_can_be_cancelled(tiled,
         token.cancel("enough")
         (result,) = waiting.result(DEADLINE)
     assert result.outcome == GetPathOutcome.CANCELED and result.message == "enough"
-    with tiled.turn_to_search() as has_turn:
-        assert has_turn
+    with tiled.turn_to_search() as moment:
+        assert moment is not None
 
 
 def test_values_are_made_again_after_they_were_forgotten_even_if_they_were_being_made():
