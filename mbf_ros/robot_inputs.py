@@ -16,6 +16,9 @@ from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.view import FloorMap, FloorWindow
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_ros.messages.floors import floor_of, floor_window_of
 from mbf_ros.messages.geometry import MessageContext, odometry_of, pose_of, transforms_of
 from mbf_ros.messages.interfaces import Message, MessageError
 from mbf_ros.messages.sensors import SENSORS
@@ -24,6 +27,7 @@ from mbf_ros.ros2.robot import RosRobot
 ODOM, TF, TF_STATIC = "odom", "/tf", "/tf_static"
 GOALS = ("goal_pose", "move_base_simple/goal")
 Take = Callable[[Message], None]
+DEPTH = 100
 
 
 class Quality(Enum):
@@ -44,12 +48,18 @@ class Input:
     quality : Quality
     taker : callable
         Uses a message; raises ValueError or TransformError where it means nothing, or is refused.
+    depth : int
+        How many messages wait to be taken; of a map only the newest counts.
+    optional : bool
+        Whether it is left out where the package of its type is not installed.
     """
 
     topic: str
     type: str
     quality: Quality
     taker: Take
+    depth: int = DEPTH
+    optional: bool = False
 
     def take(self, message: Message) -> None:
         """Take a message; raises MessageError where it means nothing, or is refused."""
@@ -100,6 +110,16 @@ class RobotInputs:
         for topic, (kind, source) in chosen.items():
             yield Input(topic, kind, Quality.SENSOR_DATA, self._sensor(topic, kind, source, take_scan))
 
+    def of_maps(self, server: AbstractNavigationServer) -> Iterator[Input]:
+        """Yield the maps of floors that a server expects, and their changes."""
+        for topic in server.map_topics:
+            for suffix, kind, quality, read in (
+                ("", "nav_msgs/OccupancyGrid", Quality.LATCHED, floor_of),
+                ("_updates", "map_msgs/OccupancyGridUpdate", Quality.MANY, floor_window_of),
+            ):
+                take = partial(self._take_floor, server, topic, read)
+                yield Input(topic + suffix, kind, quality, take, depth=DEPTH if suffix else 1, optional=bool(suffix))
+
     def of_users(
         self, send: Callable[[MoveBaseGoal], AnyGoalHandle], refusal: Callable[[], str] = lambda: ""
     ) -> Iterator[Input]:
@@ -114,6 +134,15 @@ class RobotInputs:
 
         for topic in GOALS:
             yield Input(topic, "geometry_msgs/PoseStamped", Quality.MANY, go_to)
+
+    def _take_floor(
+        self,
+        server: AbstractNavigationServer,
+        topic: str,
+        read: Callable[[Message, MessageContext], FloorMap | FloorWindow],
+        message: Message,
+    ) -> None:
+        server.take_floor(topic, read(message, self.context()))
 
     def _sensor(self, topic: str, kind: str, source: str, take_scan: Callable[[RangeScan], None]) -> Take:
         def take(message: Message) -> None:

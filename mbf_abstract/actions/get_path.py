@@ -83,6 +83,9 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         """Plan with the map kept alive, under patience and retries, and judge how it ended."""
         handle, run = job.handle, self._supervise(job, plugin)
         with run, run.map_in_use():
+            if missing := run.call_beside("the map's missing_floor()", self.runtime.map_hooks.missing_floor):
+                # permanent: no recovery brings a map
+                return GetPathResult(GetPathOutcome.MAP_ERROR, missing, planner=plugin.name, permanent=True)
             execution = PlannerExecution(run, request, handle.goal.goal_area, has_fallback)
             state = execution.execute()
         if run.waited and not run.canceled:

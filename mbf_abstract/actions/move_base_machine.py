@@ -68,6 +68,7 @@ class MoveBaseMachine:
         self._recoveries = RecoverySequence(self._runtime, plugins)
         self._oscillation = OscillationDetector(self._runtime.clock)
         self._replan_watch = Stopwatch(self._runtime.clock)
+        self._planned_floor = self._followed_floor = self._runtime.map_hooks.floors_taken()
         self._condition = self._runtime.clock.condition()
         self._mailbox: deque[AnyGoalHandle] = deque()
 
@@ -141,6 +142,7 @@ class MoveBaseMachine:
     def _ask_for_plan(self) -> None:
         goal = self._job.handle.goal
         self._replan_watch.restart()
+        self._planned_floor = self._runtime.map_hooks.floors_taken()
         if self._follow is None:
             self._enter(MoveBaseState.GET_PATH)
         self._plan = self._send(
@@ -176,10 +178,11 @@ class MoveBaseMachine:
     def _on_replan_failed(self, result: GetPathResult) -> End | None:
         policy = self._runtime.parameters.replan_failed_policy
         taken_over = self._state is MoveBaseState.GET_PATH  # the old path leads to an old goal: never keep it
-        if policy == "keep" and not taken_over:
+        outdated = taken_over or self._followed_floor != self._planned_floor  # or over an old floor
+        if policy == "keep" and not outdated:
             return None
         failure = (result.outcome, f"replanning failed: {result.message}")
-        if (policy == "stop" and not taken_over) or (result.permanent and taken_over):
+        if (policy == "stop" and not taken_over) or (result.permanent and outdated):
             return self._end_after_stop(failure)
         self._stop_then_recover(Trigger.PLAN, failure)
         return None
@@ -193,6 +196,8 @@ class MoveBaseMachine:
         """Seconds until the next replanning; None while there is none to come."""
         frequency = self._runtime.parameters.planner_frequency
         driving = self._state is MoveBaseState.EXE_PATH and self._plan is None and not self._job.handle.paused
+        if driving and self._planned_floor != self._runtime.map_hooks.floors_taken():
+            return 0.0
         if frequency <= 0.0 or not driving or self._distance_to_goal() <= NO_REPLAN_WITHIN:
             return None
         return max(0.0, 1.0 / frequency - self._replan_watch.elapsed)
@@ -207,6 +212,7 @@ class MoveBaseMachine:
         if self._follow is None:
             self._oscillation.reset()
             self._replan_watch.restart()
+        self._followed_floor = self._planned_floor
         self._enter(MoveBaseState.EXE_PATH)
         self._follow = self._send(
             self._sub_actions.exe_path,

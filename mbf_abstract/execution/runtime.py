@@ -32,6 +32,12 @@ class MapHooks(Protocol):
     def map_problem(self) -> str:
         """Why the map must not be driven on right now (e.g. a silent sensor); empty = it is current."""
 
+    def missing_floor(self) -> str:
+        """Which floor has not come yet, so that nothing can be planned; empty if all are there."""
+
+    def floors_taken(self) -> int:
+        """How many floors the map has taken up at run time; a plan of before is one on another floor."""
+
     def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
         """The answer of a controller with a command by which the robot touches nothing that moves."""
 

@@ -20,6 +20,7 @@ from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.contact import RobotBox
 from mbf_abstract.maps.tracking.objects import TrackedObject
+from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_abstract.plugins import Plugin, PluginContext
 
 PlaceCheck = Callable[[Pose], PlaceAnswer]
@@ -40,6 +41,8 @@ class NavigationMap(ABC):
     layers: Mapping[str, Any] = MappingProxyType({})
     follows_robot: bool = False
     """Whether an update needs the robot's pose."""
+    floors_taken: int = 0
+    """How often an update has taken up a floor that came at run time, see ``take_floor``."""
 
     @property
     def inscribed_radius(self) -> float:
@@ -79,6 +82,26 @@ class NavigationMap(ABC):
     def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
         """What moves, or has stopped, among what its sensors see, at ``now`` [s]; empty if no layer tracks objects."""
         return ()
+
+    # -------------------------------------------------------------------------------------------------- floors
+    @property
+    def map_topics(self) -> tuple[str, ...]:
+        """Names of the topics on which layers expect the map of the floor, sorted; empty if it is all in files."""
+        return ()
+
+    def take_floor(self, topic: str, floor: FloorMap | FloorWindow) -> None:
+        """Keep the map of a floor, or a change of its last one, for the next update; never waits for an update.
+
+        Raises
+        ------
+        ValueError
+            The map has no use for it: no layer expects it, it is too large, or a change of a map that is not there.
+        """
+        raise ValueError(f"no layer of the map takes a floor from {topic}")
+
+    def missing_floor(self) -> str:
+        """Which floor has not come yet, so that nothing can be planned; empty if all are there."""
+        return ""
 
     # -------------------------------------------------------------------------------------------------- places
     @abstractmethod

@@ -94,9 +94,17 @@ class ServedMap(Generic[Map]):
                 pose = self._runtime.transforms.transform_pose(self._runtime.robot.pose(), self.map.frame_id)
             except (RobotStateError, TransformError):
                 pose = None
+        floors = self.map.floors_taken
         self.map.update(pose, self._runtime.clock.now())
+        if self.map.floors_taken != floors:
+            self._report_floor()
         for event in self._motions.changes(self.tracked_objects()):
             self._runtime.events.emit(EventKind.OBJECT, self.name, **event)
+
+    def _report_floor(self) -> None:
+        """Note a new floor, and what is suspicious on it."""
+        self._runtime.events.emit(EventKind.MAP, self.name, message=f"{self.name}: a new floor has come")
+        self.report_configuration_warnings()
 
     def tracked_objects(self) -> tuple[TrackedObject, ...]:
         """What the map tracks, now."""

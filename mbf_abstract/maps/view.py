@@ -1,8 +1,8 @@
-"""Views of a map for pictures and viewers: an image of costs, a mesh with costs, directions."""
+"""Maps for pictures, viewers and messages: an image of costs, a floor of cells, a mesh with costs, directions."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ class GridView:
 
 @dataclass(frozen=True, eq=False)
 class FloorMap:
-    """Content of a map file of a floor.
+    """The map of a floor, of a file or a message.
 
     Attributes
     ----------
@@ -37,14 +37,59 @@ class FloorMap:
         0 free to 100 and above occupied, 255 unknown; row 0 at the smallest y.
     resolution : float
         Side of a cell [m].
-    origin_x, origin_y : float
-        Lower left corner of cell (0, 0) [m].
+    origin_x, origin_y, yaw : float
+        Pose [m, m, rad] of the lower left corner of cell (0, 0).
+    frame_id : str
+        Frame of that pose; empty = that of who asks.
     """
 
     occupancy: NDArray[np.uint8]
     resolution: float
     origin_x: float
     origin_y: float
+    yaw: float = 0.0
+    frame_id: str = ""
+
+    def equals(self, other: FloorMap) -> bool:
+        """Whether the other map says the same of the same place."""
+        here = (self.resolution, self.origin_x, self.origin_y, self.yaw, self.frame_id)
+        there = (other.resolution, other.origin_x, other.origin_y, other.yaw, other.frame_id)
+        return here == there and np.array_equal(self.occupancy, other.occupancy)
+
+    def with_window(self, window: FloorWindow) -> FloorMap:
+        """Return the map with other values in a window; raises ValueError where that is not on it."""
+        height, width = window.occupancy.shape
+        rows, columns = self.occupancy.shape
+        if window.frame_id != self.frame_id:
+            raise ValueError(f"the update is in the frame {window.frame_id!r}, its map in {self.frame_id!r}")
+        if not (0 <= window.x <= columns - width and 0 <= window.y <= rows - height):
+            raise ValueError(
+                f"the update of {width} x {height} cells at ({window.x}, {window.y}) reaches beyond its map of "
+                f"{columns} x {rows}"
+            )
+        occupancy = self.occupancy.copy()
+        occupancy[window.y : window.y + height, window.x : window.x + width] = window.occupancy
+        return replace(self, occupancy=occupancy)
+
+
+@dataclass(frozen=True, eq=False)
+class FloorWindow:
+    """New values of a part of a floor's map.
+
+    Attributes
+    ----------
+    occupancy : (height, width) uint8
+        As in ``FloorMap``.
+    x, y : int
+        Column and row of its first cell on the map.
+    frame_id : str
+        That of the map.
+    """
+
+    occupancy: NDArray[np.uint8]
+    x: int
+    y: int
+    frame_id: str = ""
 
 
 @dataclass(frozen=True, eq=False)

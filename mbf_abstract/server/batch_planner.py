@@ -134,7 +134,9 @@ class BatchPlanner:
 
         def work(planner: AbstractPlanner) -> None:
             for index in indices():
-                answer = _ask(planner, requests[index])
+                missing = self._server.missing_floor()
+                no_map = PlanResult(GetPathOutcome.MAP_ERROR, missing, permanent=True)
+                answer = no_map if missing else _ask(planner, requests[index])
                 results[index] = path_result(answer, requests[index], self._server.runtime, planner.name)
 
         planners = self._planners[: len(requests)]

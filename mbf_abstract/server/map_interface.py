@@ -17,7 +17,7 @@ from mbf_abstract.config.configuration import Config
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.maps.view import FieldView, FloorMap, GridView, MapView, MeshView
+from mbf_abstract.maps.view import FieldView, FloorMap, FloorWindow, GridView, MapView, MeshView
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugins import ControlResult, PluginKind
 from mbf_abstract.server.plugin_host import PluginHost
@@ -54,6 +54,26 @@ class MapInterface(PluginHost):
     def listens_to(self, source: str) -> bool:
         """Whether scans of a source change the map; True of a server that does not know."""
         return True
+
+    @property
+    def map_topics(self) -> tuple[str, ...]:
+        """Names of the topics on which maps of floors are expected, sorted; empty if all is in files."""
+        return ()
+
+    def take_floor(self, topic: str, floor: FloorMap | FloorWindow) -> None:
+        """Feed the map of a floor that has come on a topic, or a change of its last one, into the map.
+
+        Raises ValueError where the map has no use for it; it stays as it is.
+        """
+        raise ValueError(f"the {self.config.backend} server takes no floor from {topic}")
+
+    def missing_floor(self) -> str:
+        """Which floor has not come yet, so that nothing can be planned; empty if all are there."""
+        return ""
+
+    def floors_taken(self) -> int:
+        """How many floors the map that plans are made on has taken up at run time."""
+        return 0
 
     @classmethod
     def config_for_map(cls, file: FilePath, unknown_is_free: bool = True) -> str | None:

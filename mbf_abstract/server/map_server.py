@@ -21,6 +21,7 @@ from mbf_abstract.maps.scan_intake import ScanIntake
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.maps.tracking.contact_guard import ContactGuard
+from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult, PluginKind
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
@@ -76,6 +77,36 @@ class MapServer(AbstractNavigationServer):
     def listens_to(self, source: str) -> bool:
         """Whether a layer of any map takes the scans of a source."""
         return any(served.map.listens_to(source) for served in self.served.values())
+
+    @property
+    def map_topics(self) -> tuple[str, ...]:
+        """Those of all maps."""
+        return tuple(sorted({topic for served in self.served.values() for topic in served.map.map_topics}))
+
+    def take_floor(self, topic: str, floor: FloorMap | FloorWindow) -> None:
+        """Hand a floor to every map that expects it; each shows it from its next update on.
+
+        Raises ValueError where no map expects it, or one refuses it, which does not keep it from the others.
+        """
+        expecting = [served for served in self.served.values() if topic in served.map.map_topics]
+        if not expecting:
+            super().take_floor(topic, floor)
+        refusals = [refusal for served in expecting if (refusal := _refusal(served, topic, floor))]
+        if refusals:
+            raise ValueError("; ".join(refusals))
+
+    def missing_floor(self) -> str:
+        """That of the map that plans are made on; one that has come is taken up at once."""
+        served = next(iter(self.served.values()))
+        if served.map.missing_floor():
+            served.update()
+        missing: str = served.map.missing_floor()
+        return missing
+
+    def floors_taken(self) -> int:
+        """Those of the map that plans are made on."""
+        count: int = next(iter(self.served.values())).map.floors_taken
+        return count
 
     def map_problem(self, name: str = "") -> str:
         """Why a map is stale, by default the one that the robot drives on; empty while it is fresh.
@@ -174,3 +205,12 @@ class MapServer(AbstractNavigationServer):
             problem = f"there is no layer {layer!r}" if not found else f"several maps have a layer {layer!r}"
             raise ServerError(f"{problem}, known are {', '.join(places) or 'none'}")
         return places[found[0]]
+
+
+def _refusal(served: ServedMap[Any], topic: str, floor: FloorMap | FloorWindow) -> str:
+    """Why a map refuses a floor; empty if it has taken it."""
+    try:
+        served.map.take_floor(topic, floor)
+    except ValueError as error:
+        return f"{served.name}: {error}"
+    return ""

@@ -78,7 +78,13 @@ class OccupancyMap:
         return OccupancyMap(occupancy, self.resolution, (x + dx * self.resolution, y + dy * self.resolution, 0.0))
 
     def to_costmap(
-        self, frame_id: str = "map", track_unknown_space: bool = True, max_cells: int = MAX_CELLS
+        self,
+        frame_id: str = "map",
+        track_unknown_space: bool = True,
+        max_cells: int = MAX_CELLS,
+        *,
+        lethal_threshold: int = OCCUPIED,
+        trinary: bool = False,
     ) -> Costmap:
         """Costs of the map: occupied is lethal, free is free, anything between is scaled to 1..253.
 
@@ -92,10 +98,15 @@ class OccupancyMap:
             Keep unknown cells unknown; otherwise they become free.
         max_cells : int
             As for ``axis_aligned``, whose ValueError it raises.
+        lethal_threshold : int
+            Occupancy from which on a cell is occupied, 1 to 100.
+        trinary : bool
+            Take what lies below the threshold for free.
         """
         table = np.full(256, UNKNOWN if track_unknown_space else FREE, dtype=np.uint8)
-        table[:OCCUPIED] = np.arange(OCCUPIED) * LETHAL // OCCUPIED
-        table[OCCUPIED:UNKNOWN_OCCUPANCY] = LETHAL
+        below = np.arange(lethal_threshold) * LETHAL // lethal_threshold
+        table[:lethal_threshold] = FREE if trinary else below
+        table[lethal_threshold:UNKNOWN_OCCUPANCY] = LETHAL
         flat = self.axis_aligned(max_cells)
         return Costmap(table[flat.occupancy], flat.resolution, flat.origin[0], flat.origin[1], frame_id)
 
@@ -134,18 +145,6 @@ def _lies_in(file: Path, folder: Path) -> bool:
         return file.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError):  # a name too long, a circle of links
         return False
-
-
-def load_costmap(
-    file: Path | str,
-    frame_id: str = "map",
-    track_unknown_space: bool = True,
-    *,
-    confined: bool = False,
-    max_cells: int = MAX_CELLS,
-) -> Costmap:
-    """Read a map as ``load_map`` and turn it into a costmap, see ``OccupancyMap.to_costmap``."""
-    return load_map(file, max_cells, confined=confined).to_costmap(frame_id, track_unknown_space, max_cells)
 
 
 def load_image(

@@ -18,6 +18,8 @@ class Placement:
 
     Attributes
     ----------
+    frame_id : str
+        Frame of the data.
     T_data_costmap : Transform or None
         None where both are in one frame, and while the transform is unknown.
     problem : str
@@ -25,7 +27,7 @@ class Placement:
     """
 
     def __init__(self, frame_id: str, context: LayerContext) -> None:
-        self._frame_id = frame_id or context.frame_id
+        self.frame_id = frame_id or context.frame_id
         self._costmap_frame_id = context.frame_id
         self._transforms = context.transforms
         self.T_data_costmap: Transform | None = None
@@ -34,7 +36,7 @@ class Placement:
     @property
     def in_costmap_frame(self) -> bool:
         """Whether there is nothing to transform."""
-        return self._frame_id == self._costmap_frame_id
+        return self.frame_id == self._costmap_frame_id
 
     @property
     def known(self) -> bool:
@@ -47,8 +49,8 @@ class Placement:
             return False
         try:
             if self._transforms is None:
-                raise TransformError(f"no transforms to place data of the frame {self._frame_id!r}")
-            found = self._transforms.lookup(self._frame_id, self._costmap_frame_id)
+                raise TransformError(f"no transforms to place data of the frame {self.frame_id!r}")
+            found = self._transforms.lookup(self.frame_id, self._costmap_frame_id)
         except TransformError as error:
             self.problem = str(error)
             return False

@@ -1,4 +1,4 @@
-"""Static layer: the map of a file (or one handed over by the program) under everything else.
+"""Static layer: the map of a file, a topic or the program under everything else.
 
 When to use: first in the list of a global map; also in a rolling local map, where it is sampled at the window's cells.
 When not: for areas a robot must not enter although they are free, use a keep-out layer, which stays when the map is
@@ -7,22 +7,34 @@ the window for each move by a cell. Known failure: furniture moves; combine it w
 
 The map may be given in another frame (``map_frame``), for example under a local costmap in odom: it is then placed
 by the newest transform, and again whenever that changes. While the transform is unknown the layer holds nothing
-and the costmap is not current. The interpretation of values is costmap_2d's static layer with ``trinary_costmap`` off;
-map files in trinary mode give the same result as with it on.
+and the costmap is not current.
+
+With ``map_topic`` the map comes while the server runs, from a SLAM or a map server; in its header's frame, and the grid
+of a costmap that does not roll becomes that of the map. Until the first one has come nothing can be planned, unless
+there is a ``map_file``, too. What sensors have marked is kept where only the values of cells change; on another grid
+only their newest scans are. As such a map may change, no goal counts as unreachable for ever because of it.
+
+The interpretation of values is that of costmap_2d's static layer, but ``trinary_costmap`` is off by default; map files
+in trinary mode give the same result either way.
 """
 
 from __future__ import annotations
+
+from collections import deque
 
 import numpy as np
 
 from mbf_abstract.config.bounded_files import named_file
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer import LayerParameters
+from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_abstract.parameters import parameter
-from mbf_costmap_nav.files.map_io import load_costmap
+from mbf_costmap_nav.files.map_description import OCCUPIED
+from mbf_costmap_nav.files.map_io import OccupancyMap, load_map
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, LETHAL, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.placement import Placement
 from mbf_costmap_nav.grid.resampling import sample_costmap
+from mbf_costmap_nav.grid.rotated_map import axis_aligned_shape
 from mbf_costmap_nav.map.layer import CombinationMethod, GridLayer, LayerContext, combine
 
 
@@ -33,6 +45,15 @@ class StaticLayerParameters(LayerParameters):
         "", "map_server YAML file or image, relative to the configuration's folder.", dynamic=False
     )
     map_frame: str = parameter("", "Frame of the map file's origin; empty = the costmap's.", dynamic=False)
+    map_topic: str = parameter(
+        "", "Topic of a nav_msgs/OccupancyGrid that is or replaces the map, e.g. /map.", dynamic=False
+    )
+    lethal_cost_threshold: int = parameter(
+        OCCUPIED, "Occupancy in percent from which on a cell is an obstacle.", ge=1, le=OCCUPIED, dynamic=False
+    )
+    trinary_costmap: bool = parameter(
+        False, "Whether what lies below the threshold is free instead of a cost in proportion.", dynamic=False
+    )
     use_maximum: bool = parameter(False, "Combine by the larger cost instead of replacing what is below.")
 
 
@@ -41,7 +62,7 @@ LETHAL_SHARE = 0.95
 
 
 class StaticLayer(GridLayer):
-    """A fixed map. See the module's text for when to use it."""
+    """A map of what stands. See the module's text for when to use it."""
 
     Parameters = StaticLayerParameters
     clearable = False
@@ -49,33 +70,85 @@ class StaticLayer(GridLayer):
 
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
-        if self.parameters.map_file:
-            self._map = load_costmap(
-                named_file(context.base_folder, self.parameters.map_file),
-                self.parameters.map_frame or context.frame_id,
-                context.track_unknown_space,
-                confined=context.confine_images,
-                max_cells=context.max_cells,
-            )
-        elif context.static_map is not None:
-            self._map = context.static_map
-        else:
-            raise ValueError(f"static layer {context.name!r} needs map_file, or a map handed over by the program")
+        self._context = context
+        self._map = self._first_map()
+        self._floor: FloorMap | None = None  # the last one that has come
+        self._waiting: deque[FloorMap] = deque(maxlen=1)
         self._changed = EMPTY_BOX
-        self._placement = Placement(self._map.frame_id, context)
+        self._placement = Placement("" if self._map is None else self._map.frame_id, context)
+
+    def _first_map(self) -> Costmap | None:
+        context, p = self._context, self.parameters
+        if p.map_file:
+            file, frame_id = named_file(context.base_folder, p.map_file), p.map_frame or context.frame_id
+            floor = load_map(file, context.max_cells, confined=context.confine_images)
+            return self._costmap(floor, frame_id)
+        if context.static_map is None and not p.map_topic:
+            raise ValueError(
+                f"static layer {context.name!r} needs map_file or map_topic, or a map handed over by the program"
+            )
+        return context.static_map
+
+    def _costmap(self, floor: OccupancyMap, frame_id: str) -> Costmap:
+        p = self.parameters
+        return floor.to_costmap(
+            frame_id,
+            self._context.track_unknown_space,
+            self._context.max_cells,
+            lethal_threshold=p.lethal_cost_threshold,
+            trinary=p.trinary_costmap,
+        )
+
+    @property
+    def map_topic(self) -> str:
+        """Topic of the map."""
+        topic: str = self.parameters.map_topic
+        return topic
+
+    def take_floor(self, floor: FloorMap | FloorWindow) -> None:
+        """Keep a map, or the last one with its change; one that says nothing new is ignored.
+
+        Raises ValueError where it has more than ``max_cells``, or is a change of a map that has not come.
+        """
+        if isinstance(floor, FloorWindow):
+            if self._floor is None:
+                raise ValueError(f"the update comes before the first map on {self.map_topic}")
+            floor = self._floor.with_window(floor)
+        height, width = floor.occupancy.shape
+        if height * width > self._context.max_cells:
+            raise ValueError(f"{width} x {height} cells are more than the limit of {self._context.max_cells}")
+        axis_aligned_shape(floor.occupancy.shape, floor.yaw, self._context.max_cells)
+        if self._floor is None or not floor.equals(self._floor):
+            self._floor = floor
+            self._waiting.append(floor)
+
+    def place_floor(self) -> bool:
+        """Make the map that has come the floor plan."""
+        if not self._waiting:
+            return False
+        floor = self._waiting.popleft()
+        frame_id = floor.frame_id or self._context.frame_id
+        pose = (floor.origin_x, floor.origin_y, floor.yaw)
+        self._map = self._costmap(OccupancyMap(floor.occupancy, floor.resolution, pose), frame_id)
+        if frame_id != self._placement.frame_id:
+            self._placement = Placement(frame_id, self._context)
+            self._placement.refresh()
+        return True
 
     @property
     def permanent(self) -> bool:
-        """Whether its map is in the costmap's frame."""
-        return self._placement.in_costmap_frame
+        """Whether its map is in the costmap's frame, and no topic replaces it."""
+        return self._placement.in_costmap_frame and not self.map_topic
 
     @property
-    def floor_plan(self) -> Costmap:
-        """The map as loaded."""
+    def floor_plan(self) -> Costmap | None:
+        """The map as it came; None before the first one of a topic."""
         return self._map
 
     def configuration_warning(self) -> str:
         """Warn that nearly all of the map is occupied."""
+        if self._map is None:
+            return ""
         known = self._map.cells != UNKNOWN
         share = float(np.sum(self._map.cells == LETHAL)) / max(int(np.sum(known)), 1)
         if share < LETHAL_SHARE:
@@ -90,8 +163,8 @@ class StaticLayer(GridLayer):
         return UNKNOWN
 
     def preferred_geometry(self) -> GridGeometry | None:
-        """Grid of the map, unless it is in another frame."""
-        return self._map.geometry if self._placement.in_costmap_frame else None
+        """Grid of the map, unless it is in another frame or has not come."""
+        return self._map.geometry if self._map is not None and self._placement.in_costmap_frame else None
 
     def match_geometry(self, geometry: GridGeometry) -> None:
         """Sample the map at the costmap's cells."""
@@ -109,14 +182,14 @@ class StaticLayer(GridLayer):
     def _sample(self, box: CellBox) -> None:
         """Take each cell's value from the map, without losing obstacles; nothing while the map cannot be placed."""
         box = box.clipped(self.geometry.box)
-        if self._placement.known:
+        if self._map is not None and self._placement.known:
             self.cells[box.slices] = sample_costmap(
                 self._map, self.geometry, box, self.default_value, self._placement.T_data_costmap
             )
 
     def stale_reason(self, now: float) -> str:
-        """Why the map cannot be placed: its frame is unknown."""
-        return self._placement.problem
+        """Why there is no map, or it cannot be placed because its frame is unknown."""
+        return f"no map has come on {self.map_topic} yet" if self._map is None else self._placement.problem
 
     def reset(self) -> None:
         """Return to the map as loaded, undoing cleared areas."""
@@ -130,6 +203,8 @@ class StaticLayer(GridLayer):
         return box.union(changed)
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
-        """Write the map; unknown cells of it leave what is below."""
+        """Write the map; unknown cells of it leave what is below. Before the map comes all is unknown."""
+        if self._map is None:
+            cells[box.slices] = UNKNOWN
         method = CombinationMethod.MAXIMUM if self.parameters.use_maximum else CombinationMethod.OVERWRITE
         combine(cells, self.cells, box, method)

@@ -16,6 +16,7 @@ name, as in the plugin lists of MBF::
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from pydantic import field_validator, model_validator
@@ -132,7 +133,7 @@ def build_layered_costmap(
     transforms : TransformBuffer, optional
         For layers whose data is in another frame than the costmap.
     static_maps : StaticMaps, optional
-        Takes the floor plans of the layers, and shows them those of other costmaps.
+        Is asked for the floor plans of the layers, and shows them those of other costmaps.
 
     Raises
     ------
@@ -162,8 +163,7 @@ def build_layered_costmap(
         for planned in plan
     ]
     for layer in layers:
-        if layer.floor_plan is not None:
-            static_maps.add(layer.floor_plan)
+        static_maps.add(partial(getattr, layer, "floor_plan"))
     return LayeredCostmap(
         parameters.geometry(),
         layers,

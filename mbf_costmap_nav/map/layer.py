@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
+from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_costmap_nav.grid.costmap import FREE, MAX_CELLS, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.map.static_maps import StaticMaps
@@ -102,6 +103,25 @@ class CostmapLayer(MapLayer):
     def floor_plan(self) -> Costmap | None:
         """Map of what stands for ever, in its own frame, if the layer has one."""
         return None
+
+    @property
+    def map_topic(self) -> str:
+        """Topic on which the layer expects its floor plan; empty if it expects none."""
+        return ""
+
+    def take_floor(self, floor: FloorMap | FloorWindow) -> None:
+        """Keep a floor that has come on ``map_topic``; raises ValueError where the layer has no use for it.
+
+        Called on the thread of the topic, also while the map is being updated; must be quick.
+        """
+        raise ValueError(f"the layer {self.name!r} expects no floor")
+
+    def place_floor(self) -> bool:
+        """Begin an update: make the floor that has come the floor plan; return whether there is another one.
+
+        ``match_geometry`` follows where it is.
+        """
+        return False
 
     def match_geometry(self, geometry: GridGeometry) -> None:
         """Take over a new grid and forget all cells."""

@@ -20,7 +20,8 @@ import numpy as np
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.maps.layers.layer_stack import LayerStack
-from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
+from mbf_abstract.maps.view import FloorMap, FloorWindow
+from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.map.layer import CostmapLayer, shifted
 from mbf_costmap_nav.map.snapshot_answers import SnapshotAnswers
@@ -76,10 +77,9 @@ class LayeredCostmap(SnapshotAnswers):
         super().__init__()
         self.follows_robot = True
         self.layers: LayerStack[CostmapLayer] = LayerStack(layers)
-        if not rolling_window:
-            geometry = next((own for layer in layers if (own := layer.preferred_geometry())), geometry)
         self.frame_id = frame_id
         self.rolling_window = rolling_window
+        geometry = self._preferred_geometry() or geometry
         self.max_age = max_age
         self._default_cost = UNKNOWN if track_unknown_space else FREE
         self.geometry = geometry
@@ -89,10 +89,29 @@ class LayeredCostmap(SnapshotAnswers):
         self.last_update: float | None = None
         self._pending = geometry.box
         self._snapshot: Costmap | None = None
-        self._unmoved: set[str] = set()  # names of layers that have not followed the window
+        self._unmoved: set[str] = set()  # names of layers whose cells are not those of the window, or of their floor
         for layer in layers:
             layer.match_geometry(geometry)
         self.set_footprint(footprint)
+
+    # ------------------------------------------------------------------------------------------------- floors
+    @property
+    def map_topics(self) -> tuple[str, ...]:
+        """Topics on which layers expect their floor plans, sorted."""
+        return tuple(sorted({layer.map_topic for layer in self.layers.values() if layer.map_topic}))
+
+    def take_floor(self, topic: str, floor: FloorMap | FloorWindow) -> None:
+        """Hand a floor to the layers that expect it; the next update takes it up. See ``NavigationMap.take_floor``."""
+        expecting = [layer for layer in self.layers.values() if layer.map_topic and layer.map_topic == topic]
+        if not expecting:
+            super().take_floor(topic, floor)
+        for layer in expecting:
+            layer.take_floor(floor)
+
+    def missing_floor(self) -> str:
+        """The first layer whose floor plan has not come."""
+        waiting = (layer for layer in self.layers.enabled if layer.map_topic and layer.floor_plan is None)
+        return next((f"layer {one.name!r}: no map has come on {one.map_topic} yet" for one in waiting), "")
 
     # ------------------------------------------------------------------------------------------------ reading
     def snapshot(self) -> Costmap:
@@ -176,7 +195,8 @@ class LayeredCostmap(SnapshotAnswers):
             raise ValueError(f"robot pose is in frame {robot_pose.frame_id!r}, the costmap in {self.frame_id!r}")
         with self._lock:
             self.end_overrides(now)
-            for name in sorted(self._unmoved):  # a layer raised when the window moved: it begins anew
+            self._place_floors()
+            for name in sorted(self._unmoved):  # the grid is another one, or a layer raised when the window moved
                 with self.layers.computing(self.layers[name]):
                     self.layers[name].match_geometry(self.geometry)
                 self._unmoved.discard(name)
@@ -194,6 +214,25 @@ class LayeredCostmap(SnapshotAnswers):
             self.layers.problem = ""
             self.last_update = now
             return EMPTY_BOX if box.empty else box
+
+    def _place_floors(self) -> None:
+        """Let layers take up the floors that have come; on another grid all layers begin anew."""
+        for layer in self.layers.values():
+            with self.layers.computing(layer):
+                if layer.place_floor():
+                    self.floors_taken += 1
+                    self._unmoved.add(layer.name)
+                    self._pending = self.geometry.box
+        geometry = self._preferred_geometry()
+        if geometry is not None and geometry != self.geometry:
+            self.geometry, self._pending = geometry, geometry.box
+            self._cells = np.full((geometry.height, geometry.width), LETHAL, dtype=np.uint8)  # if a layer raises now
+            self._unmoved |= set(self.layers)
+
+    def _preferred_geometry(self) -> GridGeometry | None:
+        """Grid that a layer wants the map to have; None if none wants one, or the window rolls."""
+        wanted = () if self.rolling_window else (layer.preferred_geometry() for layer in self.layers.values())
+        return next(filter(None, wanted), None)
 
     def _recompute(self, box: CellBox) -> None:
         self._cells[box.slices] = self._default_cost

@@ -5,6 +5,8 @@ A local costmap has no floor plan as a rule, so the costmaps of a server share t
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -26,12 +28,11 @@ class StaticMaps:
 
     def __init__(self, transforms: TransformBuffer | None = None) -> None:
         self._transforms = transforms
-        self._floor_plans: list[Costmap] = []
-        self._clearances: list[NDArray[np.float32]] = []  # of the first floor plans, as far as they were asked for
+        self._clearances: dict[Callable[[], Costmap | None], tuple[Costmap, NDArray[np.float32]] | None] = {}
 
-    def add(self, floor_plan: Costmap) -> None:
-        """Take a floor plan."""
-        self._floor_plans.append(floor_plan)
+    def add(self, floor_plan: Callable[[], Costmap | None]) -> None:
+        """Take what returns a floor plan, which may be another one each time."""
+        self._clearances[floor_plan] = None
 
     def explain(self, points: FloatArray, frame_id: str, distance: float) -> NDArray[np.bool_]:
         """Mask (n,) of the points (n, 3) [m] whose cell is within ``distance`` [m] of a wall of a floor plan.
@@ -42,9 +43,7 @@ class StaticMaps:
             The frame of a floor plan is not known.
         """
         explained = np.zeros(len(points), dtype=np.bool_)
-        for floor_plan in self._floor_plans[len(self._clearances) :]:
-            self._clearances.append(_clearance(floor_plan))
-        for floor_plan, clearance in zip(self._floor_plans, self._clearances, strict=True):
+        for floor_plan, clearance in self._present():
             there = points
             if floor_plan.frame_id != frame_id and self._transforms is not None:
                 there = self._transforms.lookup(floor_plan.frame_id, frame_id).apply(points)
@@ -53,6 +52,16 @@ class StaticMaps:
             inside = (ix >= 0) & (ix < floor_plan.width) & (iy >= 0) & (iy < floor_plan.height)
             explained[inside] |= clearance[iy[inside], ix[inside]] <= distance
         return explained
+
+    def _present(self) -> Iterator[tuple[Costmap, NDArray[np.float32]]]:
+        """Floor plans of now and the clearances on them, which are computed once for each."""
+        for source, known in list(self._clearances.items()):
+            floor_plan = source()
+            if floor_plan is None:
+                continue
+            if known is None or known[0] is not floor_plan:
+                self._clearances[source] = known = floor_plan, _clearance(floor_plan)
+            yield known
 
 
 def _clearance(floor_plan: Costmap) -> NDArray[np.float32]:

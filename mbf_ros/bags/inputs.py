@@ -20,6 +20,7 @@ from mbf_ros.bags.topics import BagTopics
 from mbf_ros.messages.geometry import MessageContext, odometry_of, quaternion_of, transforms_of, vector_of
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.messages.sensors import SENSORS
+from mbf_ros.robot_inputs import Input
 
 FROM_FUTURE = "stamped in the future"
 
@@ -80,6 +81,7 @@ class BagInputs:
             topics.static: self._take_static,
             topics.odometry: self._take_odometry,
             **{topic: partial(self._take_scan, *sensor) for topic, sensor in topics.sensors.items()},
+            **{topic: partial(self._take_floor, one) for topic, one in topics.maps.items()},
         }
         for topic, statistics in self.topics.items():
             if statistics.used_as:
@@ -143,6 +145,9 @@ class BagInputs:
             statistics.drop_by_map(name, reason_of(error), error_text(error))
         for listener in self.scan_listeners:
             listener(scan)
+
+    def _take_floor(self, taken: Input, statistics: TopicStatistics, message: Message, now: float) -> None:
+        taken.take(message)
 
     def _judge(self, scan: RangeScan) -> tuple[bool, dict[str, TransformError]]:
         """Whether a map will place a scan by the newest transform, and why maps will refuse it, by their names."""

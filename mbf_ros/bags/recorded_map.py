@@ -6,17 +6,14 @@ import json
 import math
 from pathlib import Path
 
-import numpy as np
-
-from mbf_abstract.geometry import Pose
 from mbf_abstract.whole_files import write_whole
 from mbf_ros.bags.reading import Bag, BagError
 from mbf_ros.bags.recorded_time import check_seconds
-from mbf_ros.messages.geometry import NANOSECONDS, quaternion_of, vector_of
+from mbf_ros.messages.floors import floor_of
+from mbf_ros.messages.geometry import NANOSECONDS, MessageContext
 from mbf_ros.messages.interfaces import Message, MessageError
 
 MAP_TYPE = "nav_msgs/msg/OccupancyGrid"
-UNKNOWN = 255
 YAML = """\
 image: {image}
 mode: raw  # pixels are occupancies: 0 free to 100 occupied, 255 unknown
@@ -87,19 +84,14 @@ def write_recorded_map(file: Path, message: Message) -> None:
     image = file.with_suffix(".pgm")
     if there := [one for one in (file, image) if one.exists()]:
         raise BagError(f"{there[0]}: expected a file that does not exist yet")
-    info, data = message["info"], np.asarray(message["data"])
-    width, height, resolution = info["width"], info["height"], info["resolution"]
-    if not data.size or width * height != data.size:
-        raise BagError(f"the map has {data.size} cells, its size is {width} x {height}")
-    if not (math.isfinite(resolution) and resolution > 0.0):
-        raise BagError(f"the map has a resolution of {resolution} m, expected more than 0")
     try:
-        origin = Pose(vector_of(info["origin"]["position"]), quaternion_of(info["origin"]["orientation"]))
-    except ValueError as error:
-        raise BagError(f"the origin of the map means nothing: {error}") from error
-    rows = np.where(data < 0, UNKNOWN, data).astype(np.uint8).reshape(height, width)[::-1]
+        floor = floor_of(message, MessageContext())
+    except MessageError as error:
+        raise BagError(f"the map means nothing: {error}") from error
+    height, width = floor.occupancy.shape
+    rows = floor.occupancy[::-1]
     file.parent.mkdir(parents=True, exist_ok=True)
     write_whole(image, b"P5\n%d %d\n255\n" % (width, height) + rows.tobytes())
-    resolution = float(f"{resolution:.7g}")  # float32: 0.05 was recorded as 0.05000000074505806
     name = json.dumps(image.name, ensure_ascii=False)  # quoted as in YAML: it may have a colon
-    write_whole(file, YAML.format(image=name, resolution=resolution, x=origin.x, y=origin.y, yaw=origin.yaw))
+    place = {"x": floor.origin_x, "y": floor.origin_y, "yaw": floor.yaw}
+    write_whole(file, YAML.format(image=name, resolution=floor.resolution, **place))

@@ -29,6 +29,8 @@ from mbf_ros.bags.reading import Bag, BagError
 from mbf_ros.bags.recorded_time import RecordedTime, check_seconds, steady_messages
 from mbf_ros.bags.statistics import FrameStatistics, TopicStatistics
 from mbf_ros.bags.topics import BagTopics, choose_topics
+from mbf_ros.messages.geometry import MessageContext
+from mbf_ros.robot_inputs import RobotInputs
 
 SAMPLE_PERIOD = 0.1  # s
 PICTURES = 10  # of the map, where the user asks for none
@@ -131,7 +133,8 @@ def replay_bag(
         server = session.serve(server_class, config, robot, transforms)
         for transform in options.transforms:
             transforms.set(transform)
-        topics = choose_topics(bag.types, options.topics, *_sources(server))
+        maps = RobotInputs(session.clock.now, lambda: MessageContext(config.parameters.global_frame)).of_maps(server)
+        topics = choose_topics(bag.types, options.topics, *_sources(server), maps)
         _check_transforms(bag, topics, options)
         time = RecordedTime(bag, topics, config.parameters.global_frame)
         inputs = BagInputs(bag, topics, time, server, robot, options.odometry_as_transform)

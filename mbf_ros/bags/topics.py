@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from mbf_ros.bags.reading import KNOWN_AS, BagError
+from mbf_ros.messages.interfaces import full_name
 from mbf_ros.messages.sensors import SENSORS
+from mbf_ros.robot_inputs import Input
 
-TRANSFORMS, STATIC, ODOMETRY = "tf", "tf_static", "odom"
+TRANSFORMS, STATIC, ODOMETRY, MAP = "tf", "tf_static", "odom", "map"
 ROLES = {TRANSFORMS: "tf2_msgs/msg/TFMessage", STATIC: "tf2_msgs/msg/TFMessage", ODOMETRY: "nav_msgs/msg/Odometry"}
 SENSOR_TYPES = {kind.replace("/", "/msg/"): kind for kind in SENSORS}
 USUAL_NAMES = {"scan": "sensor_msgs/LaserScan", "points": "sensor_msgs/PointCloud2", "range": "sensor_msgs/Range"}
@@ -25,23 +27,32 @@ class BagTopics:
         Topics; empty where there is none.
     sensors : dict of str to (str, str)
         Type of ``sensors.SENSORS``, and source of the configuration, by topic.
+    maps : dict of str to Input
+        What takes the maps of floors that the configuration expects, by topic.
     """
 
     transforms: str = ""
     static: str = ""
     odometry: str = ""
     sensors: dict[str, tuple[str, str]] = field(default_factory=dict)
+    maps: dict[str, Input] = field(default_factory=dict)
 
     def used_as(self, topic: str) -> str:
         """What a topic is replayed as; empty for one that is not."""
         if topic in self.sensors:
             return self.sensors[topic][1]
+        if topic in self.maps:
+            return MAP
         roles = {self.transforms: TRANSFORMS, self.static: STATIC, self.odometry: ODOMETRY}
         return roles.get(topic, "")
 
 
 def choose_topics(
-    types: Mapping[str, str], chosen: Mapping[str, str], sources: Sequence[str], takes_any: bool
+    types: Mapping[str, str],
+    chosen: Mapping[str, str],
+    sources: Sequence[str],
+    takes_any: bool,
+    maps: Iterable[Input] = (),
 ) -> BagTopics:
     """Find the topics of a bag.
 
@@ -55,6 +66,8 @@ def choose_topics(
         Observation sources that the configuration names.
     takes_any : bool
         Whether a layer takes scans of any source: each topic of a sensor is then a source, of its own name.
+    maps : iterable of Input
+        Maps of floors that the configuration expects; each is taken where the bag has it.
 
     Raises
     ------
@@ -75,7 +88,9 @@ def choose_topics(
         several = [source for source, topic in pairs.items() if topic == twice[0]]
         raise BagError(f"{twice[0]} would be {' and '.join(several)}: name the topic of each by --topic SOURCE=TOPIC")
     sensors = {topic: (SENSOR_TYPES[types[topic]], source) for source, topic in pairs.items() if topic}
-    return BagTopics(roles[TRANSFORMS], roles[STATIC], roles[ODOMETRY], sensors)
+    floors = {f"/{one.topic.lstrip('/')}": one for one in maps}
+    there = {topic: one for topic, one in floors.items() if types.get(topic) == full_name(one.type)}
+    return BagTopics(roles[TRANSFORMS], roles[STATIC], roles[ODOMETRY], sensors, there)
 
 
 def _of_role(role: str, types: Mapping[str, str]) -> list[str]:

@@ -211,9 +211,23 @@ def _numbers(kind: str, value: Any, where: str) -> NDArray[Any]:
         return value
     if not isinstance(value, list | tuple | np.ndarray):
         raise MessageError(f"{where}: expected a list of {kind}, got {_shown(value)}")
+    if kind in INTEGERS and (whole := _whole_numbers(value)) is not None:
+        limits = np.iinfo(INTEGERS[kind])
+        if limits.min <= whole.min() and whole.max() <= limits.max:
+            return whole.astype(INTEGERS[kind])
     check = _float if kind in FLOATS else _integer
     with np.errstate(over="ignore"):  # a number beyond float32 is infinite there
         return np.array([check(kind, number, f"{where}[{i}]") for i, number in enumerate(value)], np.dtype(kind))
+
+
+def _whole_numbers(value: Any) -> NDArray[np.int64] | None:
+    """A list of nothing but whole numbers at once: a map has millions. None where each must be looked at."""
+    if set(map(type, value)) != {int}:
+        return None
+    try:
+        return np.array(value, np.int64)
+    except OverflowError:
+        return None
 
 
 def _shown(value: object) -> str:

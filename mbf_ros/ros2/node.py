@@ -156,6 +156,7 @@ class NavigationNode(RobotNavigation):
         listening = Inputs(self._node)
         listening.listen(inputs.of_robot(self._robot, self._transforms, uses_odometry))
         listening.listen(inputs.of_sensors(navigator.server.take_scan, sensors))
+        listening.listen(inputs.of_maps(navigator.server))
         listening.listen(inputs.of_users(navigator.send, self._refusal))
 
     # ------------------------------------------------------------------------------------------- watching

@@ -1,7 +1,7 @@
 """What all navigators share whose robot is behind topics, a node of ROS 2 as the client of a rosbridge.
 
-They take goals once the robot is heard and all kernels are compiled, stop the robot while something fails to come, and
-end what was begun before the robot's time jumped.
+They take goals once the robot and its map are there and all kernels are compiled, stop the robot while something fails
+to come, and end what was begun before the robot's time jumped.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class RobotNavigation(ABC):
 
     def problem(self) -> str:
         """What does not come from the robot, or is not ready here; empty if a goal can be driven."""
-        return self._robot.problem() or ("" if self._ready.is_set() else COMPILING)
+        return self._missing() or ("" if self._ready.is_set() else COMPILING)
 
     def go_to(self, goal: MoveBaseGoal) -> AnyGoalHandle:
         """Send a goal of nobody, as those of topics are; raises ValueError where none is taken yet, or any more."""
@@ -132,9 +132,16 @@ class RobotNavigation(ABC):
         given = self._given_silence
         return self.session.navigator.server.runtime.parameters.command_timeout if given is None else given
 
+    def _missing(self) -> str:
+        """What does not come, of the robot or of maps on topics; empty if all does."""
+        try:
+            return self._robot.problem() or self.session.navigator.server.missing_floor()
+        except Exception as error:  # of a layer that raises at what has come
+            return f"{type(error).__name__}: {error_text(error)}"
+
     def _get_ready(self) -> None:
-        """Compile all kernels once the robot is heard, then take goals: no goal waits for a compiler."""
-        while self._robot.problem():
+        """Compile all kernels once the robot and its map are there, then take goals: no goal waits for a compiler."""
+        while self._missing():
             if self._ending.wait(WATCH_PERIOD):
                 return
         server = self.session.navigator.server
@@ -151,7 +158,7 @@ class RobotNavigation(ABC):
         """Why no goals are taken; empty if they are."""
         if self._ending.is_set():
             return f"the {self.name} ends"
-        return "" if self._ready.is_set() else f"the {self.name} is not ready"
+        return "" if self._ready.is_set() else f"the {self.name} is not ready: {self.problem()}"
 
     def _watch(self) -> None:
         """Stop the robot where something fails to come."""

@@ -24,8 +24,6 @@ from mbf_ros.robot_inputs import Input, Quality
 from mbf_ros.ros2.conversion import MissingInterfaceError, fill, interface_class, to_dict
 
 CMD_VEL = "cmd_vel"
-DEPTH = 100
-"""How many messages of a topic wait to be taken."""
 PERIOD = 0.05  # s between two looks at what is new
 WARN_PERIOD = 5.0  # s between two warnings about messages of one topic
 
@@ -75,8 +73,14 @@ class Inputs:
     def listen(self, inputs: Iterable[Input]) -> None:
         """Subscribe topics."""
         for one in inputs:
-            kind, quality = interface_class(one.type), profile(one.quality, DEPTH)
-            self._node.create_subscription(kind, one.topic, self._taking(one), quality)
+            try:
+                kind = interface_class(one.type)
+            except MissingInterfaceError as error:
+                if not one.optional:
+                    raise
+                self._node.get_logger().info(f"{one.topic} is not taken: {error}")
+                continue
+            self._node.create_subscription(kind, one.topic, self._taking(one), profile(one.quality, one.depth))
 
     def _taking(self, one: Input) -> Callable[[Any], None]:
         logger = self._node.get_logger()

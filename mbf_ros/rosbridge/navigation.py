@@ -41,7 +41,7 @@ def serve_navigator(bridge: Bridge, navigator: Navigator, context: MessageContex
         bridge.actions.actions[name] = ServedAction(mapping, navigator.send)
         bridge.services.services[f"{name}/_action/cancel_goal"] = _cancel_service(bridge, name)
     inputs = RobotInputs(navigator.server.runtime.clock.now, lambda: context)
-    for one in inputs.of_users(navigator.send):
+    for one in (*inputs.of_maps(navigator.server), *inputs.of_users(navigator.send)):
         bridge.topics.add_input(absolute(one.topic), one.type, one.take)
     for name, question in MAP_QUESTIONS.items():
         bridge.services.services[f"{NODE}/{name}"] = _map_service(navigator, question, context)

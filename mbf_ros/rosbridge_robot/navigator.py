@@ -123,6 +123,7 @@ class RobotNavigator(RobotNavigation):
         sensors = used_sensors(self._options.sensors, navigator.server.listens_to, self._report)
         self._topics.listen_to(inputs.of_robot(self._robot, self._transforms, uses_odometry))
         self._topics.listen_to(inputs.of_sensors(navigator.server.take_scan, sensors), self._options.cloud_period)
+        self._topics.listen_to(inputs.of_maps(navigator.server))
         self._topics.listen_to(inputs.of_users(navigator.send, self._refusal))
         self._links.handlers |= {
             "send_action_goal": self._goals.take_goal,

@@ -13,7 +13,7 @@ from mbf_abstract.config.configuration import load_config
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.server.factory import read_config
 from mbf_costmap_nav.files.map_description import MapError
-from mbf_costmap_nav.files.map_io import load_costmap, load_image, load_map
+from mbf_costmap_nav.files.map_io import load_image, load_map
 from mbf_costmap_nav.grid.zones import load_zones
 from mbf_mesh_nav.files.lvr2_io import read_lvr2_vertex_attributes, write_lvr2_mesh
 from mbf_mesh_nav.files.mesh_io import read_mesh
@@ -25,7 +25,7 @@ DESCRIPTION = "image: map.png\nresolution: 0.05\norigin: [0, 0, 0]\n"
 EPS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 20 20\n%%EndComments\nshowpage\n%%EOF\n"
 
 
-@pytest.mark.parametrize("reads", [load_image, load_map, load_costmap])
+@pytest.mark.parametrize("reads", [load_image, load_map])
 def test_a_postscript_file_called_png_starts_no_program(tmp_path, monkeypatch, reads):
     victim, ghostscript = tmp_path / "victim", tmp_path / "gs"
     ghostscript.write_text(f"#!/bin/sh\ntouch {victim}\n")
@@ -41,13 +41,12 @@ def test_a_postscript_file_called_png_starts_no_program(tmp_path, monkeypatch, r
 
 
 @pytest.mark.parametrize("name", ["map.png", "map.yaml"])
-@pytest.mark.parametrize("reads", [load_map, load_costmap])
-def test_a_pipe_instead_of_a_map_is_refused_at_once(tmp_path, name, reads):
+def test_a_pipe_instead_of_a_map_is_refused_at_once(tmp_path, name):
     (tmp_path / "map.yaml").write_text(DESCRIPTION)
     (tmp_path / name).unlink(missing_ok=True)
     os.mkfifo(tmp_path / name)
     with pytest.raises(MapError, match="got a pipe"):
-        reads(tmp_path / "map.yaml")
+        load_map(tmp_path / "map.yaml")
 
 
 @pytest.mark.parametrize(

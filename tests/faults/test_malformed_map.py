@@ -15,7 +15,7 @@ from mbf_abstract.navigator import Navigator
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.files.map_description import MapError, read_description
-from mbf_costmap_nav.files.map_io import load_costmap, load_image, load_map
+from mbf_costmap_nav.files.map_io import load_image, load_map
 from mbf_costmap_nav.grid.zones import load_zones
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 
@@ -89,7 +89,7 @@ def test_a_nasty_zones_file_is_refused_in_a_short_message(tmp_path, text):
 
 
 def test_a_file_whose_name_holds_a_null_character_is_refused():
-    for load in (load_map, load_costmap, load_zones):
+    for load in (load_map, load_zones):
         with pytest.raises(MapError):
             load(Path("map\0.yaml"))
 

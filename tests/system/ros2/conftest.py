@@ -196,7 +196,8 @@ class Robot(Peer):
         self.wait_for(lambda line: line.get("done") == f"{topic} {value}", since)
 
     def wait_until_last_speed_is_zero(self):
-        self.wait_until(lambda: [line["speed"] for line in self.lines if "speed" in line][-1:] == [0.0])
+        """Wait until it was stopped; one that has never been moved gets no command to stop, either."""
+        self.wait_until(lambda: [line["speed"] for line in self.lines if "speed" in line][-1:] in ([], [0.0]))
 
     def wait_for_speed(self, wanted, since=0):
         return self.wait_for(lambda line: "speed" in line and wanted(line["speed"]), since)

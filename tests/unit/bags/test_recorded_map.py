@@ -106,12 +106,21 @@ def test_a_replay_with_the_recorded_map_has_its_walls(tmp_path, replayed):
     assert last_grid(replayed(bag, static))[5, 7]
 
 
+def test_a_replay_takes_the_recorded_map_where_a_layer_expects_it(tmp_path, replayed):
+    walls = np.zeros((40, 60), np.int8)
+    walls[5, 7] = 100
+    static = COSTMAP.replace("layers: [{name", "layers: [{name: walls, type: static}, {name", 1)
+    static = static.replace("robot_radius: 0.2, update", "walls: {map_topic: map}, robot_radius: 0.2, update")
+    made = replayed(make_bag(tmp_path, [grid(0.0, walls, resolution=0.1), *drive(0.5)]), static)
+    assert last_grid(made)[5, 7] and made.topics["/map"].used_as == "map"
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
         ({"width": 5}, "has 24 cells, its size is 5 x 4"),
-        ({"resolution": 0.0}, "resolution of 0.0 m, expected more than 0"),
-        ({"origin": {"position": {"x": float("nan"), "y": 0.0}}}, "origin of the map means nothing"),
+        ({"resolution": 0.0}, "info.resolution: expected 0.0001 to 1000 m, got 0"),
+        ({"origin": {"position": {"x": float("nan"), "y": 0.0}}}, "the map means nothing: info.origin: "),
     ],
 )
 def test_a_map_that_means_nothing_is_refused(tmp_path, change, text):

@@ -178,3 +178,20 @@ def test_a_long_list_is_written_whole(count):
 
 def test_the_interface_file_comes_with_the_package():
     assert files("mbf_ros.messages").joinpath("interfaces.txt").is_file()
+
+
+@given(st.lists(st.one_of(st.integers(-200, 300), st.sampled_from([True, 3.0, 2.5, "1", None, 2**70, -(2**70)]))))
+def test_a_list_of_whole_numbers_is_what_its_numbers_are_one_by_one(values):
+    def one_by_one():
+        for i, value in enumerate(values):
+            completed("map_msgs/OccupancyGridUpdate", {"width": 1, "height": 1, "data": [0] * i + [value]})
+            yield int(value)
+
+    def found(read):
+        try:
+            return list(read())
+        except MessageError as error:
+            return str(error)
+
+    message = {"width": 1, "height": 1, "data": values}
+    assert found(lambda: completed("map_msgs/OccupancyGridUpdate", message)["data"].tolist()) == found(one_by_one)

@@ -140,7 +140,8 @@ def test_a_floor_plan_explains_what_is_near_its_walls():
     cells = np.zeros((20, 30), dtype=np.uint8)
     cells[10, :] = LETHAL
     static = StaticMaps(TransformBuffer())
-    static.add(Costmap(cells, 0.1))
+    plan = Costmap(cells, 0.1)
+    static.add(lambda: plan)
     points = np.array([[1.0, 1.05, 0.5], [1.0, 1.25, 0.5], [1.0, 1.45, 0.5], [50.0, 1.05, 0.5]])
     assert static.explain(points, "map", 0.2).tolist() == [True, True, False, False]
 
