@@ -1,7 +1,8 @@
 """Moving the robot inside a recovery, the same on every map: slowly, cancelable, stopped at the end.
 
-``GuardedRecovery`` is the base of the recoveries that move. The map gives two answers: why its data are too
-old to drive on, and what the robot would touch along a motion. The loop does the rest:
+``GuardedRecovery`` is the base of the recoveries that move. The map gives three answers: why its data are too
+old to drive on, what the robot would touch along a motion, and how much of its speed is safe among those who move. The
+loop drives so fast and does the rest:
 
 =================================  =====================================================================
 what happens                       how the behaviour ends
@@ -11,6 +12,7 @@ no velocity but a result           with that
 canceled                           CANCELED, the reason
 time over                          PAT_EXCEEDED
 something ahead would be touched   IMPASSABLE, the place
+somebody would be at any speed     IMPASSABLE, whom
 the gate refuses a command         STOPPED
 no fresh pose                      TF_ERROR
 the map is stale                   it waits, and goes on when the map is fresh again within its time
@@ -28,6 +30,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.navigation_map import MapPlugin
+from mbf_abstract.maps.tracking.contact_guard import slower
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractRecovery, RecoveryRequest, RecoveryResult
@@ -54,12 +57,8 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
         """Run the behaviour; the robot is stopped afterwards in any case."""
 
     def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
-        """What the robot would touch if it moved on with ``command``, and where; empty if the motion is free."""
-        there = self.on_map(pose)
-        share, reason, _ = self.navigation_map.safe_share(there, command, command, self.clock.now())
-        if share == 0.0:
-            return reason
-        return self.navigation_map.obstacle_ahead(there, command, self.parameters.check_ahead_time)
+        """What that stands the robot would touch if it moved on with ``command``, and where; empty if it is free."""
+        return self.navigation_map.obstacle_ahead(self.on_map(pose), command, self.parameters.check_ahead_time)
 
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
         """Run ``recover``, report a lost pose as TF_ERROR, and send zero velocity at the end."""
@@ -94,9 +93,10 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
             answer = Twist() if stale else velocity(pose)
             if isinstance(answer, RecoveryResult):
                 return answer
-            if obstacle := self.obstacle_ahead(pose, answer):
+            share, reason, _ = self.navigation_map.safe_share(self.on_map(pose), answer, answer, self.clock.now())
+            if obstacle := reason if share == 0.0 else self.obstacle_ahead(pose, answer):
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, obstacle)
-            refusals = 0 if motion.send(answer) else refusals + 1
+            refusals = 0 if motion.send(slower(answer, share)) else refusals + 1
             if refusals > 1 and not token.cancelled:
                 return RecoveryResult(RecoveryOutcome.STOPPED, GATE_REFUSED)
             if not motion.sleep(self.parameters.control_period):

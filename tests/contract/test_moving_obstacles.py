@@ -25,10 +25,14 @@ def make_map_server(request, backends):
 
 
 class Walker:
-    """A box that moves at constant velocity, and stops after some time; it does not stop for the robot."""
+    """A box that moves at constant velocity, and stops after some time; it does not stop for the robot.
 
-    def __init__(self, rig, x, y, vx, vy, until=math.inf):
+    Where it is ``turns_at`` [m] before or behind the robot along x, it turns and walks to the robot's side.
+    """
+
+    def __init__(self, rig, x, y, vx, vy, until=math.inf, turns_at=None):
         self.rig, self.x, self.y, self.vx, self.vy, self.until = rig, x, y, vx, vy, until
+        self.turns_at = turns_at
         self.touched_by = ""  # who moved when it first touched the robot: "robot", or "walker" alone
         self._place()
         rig.clock.spawn(self._walk, "walker", Priority.SIMULATOR)
@@ -44,6 +48,10 @@ class Walker:
     def _walk(self):
         clock, began, steps = self.rig.clock, self.rig.clock.now(), 0
         while not self.over:
+            robot = self.rig.robot.pose
+            if self.turns_at is not None and abs(self.x - robot.x) < self.turns_at:
+                self.vx, self.vy = 0.0, math.copysign(self.vx, robot.y - self.y)
+                self.turns_at = None
             if clock.now() - began < self.until:
                 self.x, self.y = self.x + self.vx * STEP, self.y + self.vy * STEP
                 self._place()
@@ -124,6 +132,17 @@ def test_without_the_guard_it_drives_into_them(make_map_server):
     with site(make_map_server, **PARAMETERS) as made:
         walker, _ = drive(made, *CROSSINGS[made.server.backend], stop_before_contact=False)
         assert walker.touched_by == "robot"
+
+
+@pytest.mark.parametrize(("turning_time", "moved"), [(0.5, "walker"), (0.0, "robot")])
+def test_the_robot_stands_when_somebody_beside_it_turns_and_runs_into_it(make_map_server, turning_time, moved):
+    """A turn is noticed late, so a robot that does not reckon with it is touched before it can stand."""
+    with site(make_map_server, **PARAMETERS) as made:
+        for name in made.server.served:
+            made.server.set_layer_parameters(f"{name}.moving", turning_time=turning_time)
+        walker = Walker(made.rig, 8.5, 4.9, -1.5, 0.0, turns_at=0.2)
+        made.navigator.exe_path(made.path((2.0, 4.0), (8.0, 4.0)))
+        assert walker.touched_by == moved
 
 
 def test_the_robot_stands_when_somebody_runs_into_it(make_map_server):

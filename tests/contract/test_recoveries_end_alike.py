@@ -146,6 +146,28 @@ def test_the_robot_stands_while_the_map_is_stale_and_the_reason_is_said(world, r
     assert len(motion.commands) > 1 and all(command.is_stopped() for command in motion.commands)
 
 
+@pytest.mark.parametrize("name", [*MOVING, "escape"])
+def test_none_moves_where_it_could_not_stop_before_somebody(world, run, name):
+    """Also not one that may drive over what stands, as ``escape`` does."""
+    navigation_map = world.map_of(lambda x, y: x > (2.6 if name == "escape" else 4.5))
+    navigation_map.safe_share = lambda *asked: (0.0, "object 3 moves in the way", 10.0)
+    result, motion = run(name, navigation_map)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    assert "object 3 moves in the way" in result.message
+    assert all(command.is_stopped() for command in motion.commands)
+
+
+def test_one_drives_no_faster_than_is_safe_among_those_who_move(world, run):
+    commands = []
+    for share in (1.0, 0.25):
+        navigation_map = world.map_of(nothing)
+        navigation_map.safe_share = lambda *asked, share=share: (share, "object 3 moves in the way", 10.0)
+        result, motion = run("back_up", navigation_map)
+        assert result.success, result.message
+        commands.append(min(command.vx for command in motion.commands))
+    assert commands[1] == 0.25 * commands[0] < 0.0
+
+
 @pytest.mark.parametrize(
     ("name", "start", "options"),
     [

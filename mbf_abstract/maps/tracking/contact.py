@@ -2,8 +2,9 @@
 
 The rule is passive motion safety (Macek, Vasquez, Fraichard, Siegwart 2009): a motion is safe if the robot can stand
 before any contact. Contacts that happen while it stands are not its fault. So a command is followed for a reaction
-time, then the robot brakes; objects keep their velocities until it stands. While somebody who moves is nearer than the
-margin, or touches it, the robot stands.
+time, then the robot brakes; objects keep their velocities until it stands, or turn now. A turn is noticed after
+``turning_time``; until then the object may be wherever it gets at its speed. While somebody who moves is nearer than
+the margin, or touches it, the robot stands.
 """
 
 from __future__ import annotations
@@ -37,6 +38,14 @@ class ContactParameters(ParameterModel):
     )
     contact_margin: float = parameter(0.1, "Distance kept to moving objects.", unit="m", ge=0.0, le=5.0)
     reaction_time: float = parameter(0.3, "Time until the robot begins to brake.", unit="s", ge=0.0, le=5.0)
+    turning_time: float = parameter(
+        0.5,
+        "Time until the robot notices that an object has turned; until then it may be wherever it gets at its speed. "
+        "0 = objects do not turn.",
+        unit="s",
+        ge=0.0,
+        le=5.0,
+    )
     decel_lim_x: float = parameter(0.5, "Deceleration of the robot.", unit="m/s^2", gt=0.0, le=100.0)
     decel_lim_theta: float = parameter(1.0, "Deceleration of its turns.", unit="rad/s^2", gt=0.0, le=100.0)
     max_wait: float = parameter(
@@ -148,8 +157,10 @@ def _first_contact(
     velocities = np.array([(known.vx, known.vy) for known in objects])
     places = middles[None] + times[:, None, None] * velocities[None]
     radii = np.array([known.radius for known in objects]) + limits.contact_margin
-    gaps = box.gaps(moving, places, radii)
-    contact = gaps < 0.0
+    contact = box.gaps(moving, places, radii) < 0.0
+    if limits.turning_time > 0.0:
+        ways = np.minimum(times, limits.turning_time)[:, None] * np.array([known.speed for known in objects])
+        contact |= box.gaps(moving, np.broadcast_to(middles, places.shape), radii + ways) < 0.0
     if not contact.any():
         return None
     return objects[int(np.argmax(contact[int(np.argmax(contact.any(axis=1)))]))]

@@ -54,7 +54,7 @@ class ContactGuard:
             return answer
         motion = Twist.planar(command.speed) if isinstance(command, AckermannCommand) else command
         share, reason, max_wait = navigation_map.safe_share(pose, velocity, motion, now)
-        safe = answer if share == 1.0 else replace(answer, command=_slower(command, share), message=reason)
+        safe = answer if share == 1.0 else replace(answer, command=slower(command, share), message=reason)
         if share > 0.0:
             if not answer.hindered_by or share * abs(command.speed) >= STANDSTILL:
                 return safe
@@ -68,7 +68,7 @@ class ContactGuard:
         return replace(safe, message=reason)
 
 
-def _slower(command: Command, share: float) -> Command:
+def slower(command: Command, share: float) -> Command:
     """The same arc at a share of the speed; a car keeps its steering angle."""
     if isinstance(command, AckermannCommand):
         return replace(command, speed=share * command.speed)

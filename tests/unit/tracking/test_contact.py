@@ -15,7 +15,8 @@ from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult
 
-LIMITS = ContactParameters(contact_margin=0.1, reaction_time=0.2, decel_lim_x=0.5)
+LIMITS = ContactParameters(contact_margin=0.1, reaction_time=0.2, turning_time=0.0, decel_lim_x=0.5)
+TURNING = LIMITS.model_copy(update={"turning_time": 0.5})
 DISC = RobotBox.disc(0.3)
 CARRIER = RobotBox(-0.35, 0.35, -0.25, 0.25, 0.0)
 HERE = Pose.planar(0.0, 0.0)
@@ -126,6 +127,38 @@ def test_gaps_are_distances_from_a_box(x, y, yaw, px, py):
     ahead, aside = c * (px - x) + s * (py - y), c * (py - y) - s * (px - x)
     inside = abs(ahead) <= 0.35 and abs(aside) <= 0.25
     assert found == pytest.approx(-0.2 if inside else nearest - 0.2, abs=0.005)
+
+
+def test_beside_somebody_who_could_turn_to_it_the_robot_is_slower_or_stands():
+    passing = [moving(0.0, y, -0.8) for y in (0.7, 0.9, 1.2, 2.0)]
+    assert [share_of(AHEAD, one) for one in passing] == [1.0] * 4
+    found = [share_of(AHEAD, one, limits=TURNING) for one in passing]
+    assert found[0] == 0.0 and found[-1] == 1.0
+    assert found == sorted(found)
+
+
+def test_a_robot_does_not_drive_up_close_to_whom_it_follows():
+    assert share_of(AHEAD, moving(0.75, 0.0, 0.8), limits=TURNING) == 0.0
+    assert share_of(AHEAD, moving(1.6, 0.0, 0.8), limits=TURNING) == 1.0
+
+
+@given(st.floats(0.05, 1.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), speeds, speeds, st.floats(-3.2, 3.2))
+@settings(max_examples=100, deadline=None)
+def test_with_the_share_that_is_safe_nobody_who_turns_is_touched_before_that_is_noticed(v, x, y, vx, vy, towards):
+    """The naive twin lets the object turn now, and stop as soon as the robot has noticed."""
+    share = share_of(Twist.planar(v), moving(x, y, vx, vy), limits=TURNING)
+    if share == 0.0:
+        return
+    speed, driven, pace, dt = math.hypot(vx, vy), 0.0, 1.0, 0.01
+    for step in range(1, 1000):
+        slowed = LIMITS.decel_lim_x / v * dt
+        pace = max(share if step * dt <= LIMITS.reaction_time else 0.0, pace - slowed)
+        driven += pace * v * dt
+        walked = speed * min(step * dt, TURNING.turning_time)
+        there = x + walked * math.cos(towards), y + walked * math.sin(towards)
+        assert math.hypot(there[0] - driven, there[1]) > 0.3 + 0.25
+        if pace == 0.0:
+            return
 
 
 def test_the_same_question_has_the_same_answer():
