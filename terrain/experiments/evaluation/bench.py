@@ -53,7 +53,7 @@ def bench(protocol: Protocol, asked: Asked) -> None:
     write_results(results, asked.out / "results.json")
     table = join(results, others, protocol)
     lines = standings(table.rows, len(protocol.trials))
-    title = f"mbf bench {protocol.name} {protocol.version}"
+    title = f"mbf bench {protocol.title}"
     own = {entry.name for entry in entries if entry.name not in protocol.entries}
     about = [*_about(results.head), *table.origins]
     write_whole(asked.out / "leaderboard.html", page(title, about, table.rows, lines, own, table.entries))

@@ -23,6 +23,7 @@ from terrain.sweeps.statistics import rate_of
 
 Row = dict[str, Any]
 
+WIDEST_NAME = 19  # characters of a name that leave room for the other columns in a terminal of 80
 MOST_FAILURES = 200  # lines of the page's list of failed runs
 
 
@@ -129,7 +130,8 @@ def terminal_table(lines: Sequence[Standing], title: str) -> Table:
     """Return the leaderboard for a terminal of 80 columns."""
     table = Table(box=SIMPLE, title=escape(title), title_justify="left")
     table.add_column("", justify="right")
-    table.add_column("entry", overflow="fold", min_width=13)
+    longest = max((len(line.entry) for line in lines), default=0)
+    table.add_column("entry", overflow="fold", min_width=min(longest, WIDEST_NAME))
     for name in ("arrived", "SPL", "time\n[s]", "plan\n[ms]"):
         table.add_column(escape(name), justify="right")
     counts = _counts(lines)

@@ -62,6 +62,7 @@ def moving(seeds: Sequence[int], levels: Sequence[int] = range(LEVELS), people: 
         {"success": SUCCESS, "tolerance": TOLERANCE},
         always,
         read_entries(FOLDER / "moving_entries.yaml"),
+        people,
     )
 
 

@@ -69,6 +69,8 @@ class Protocol:
     judge : callable
     entries : mapping of str to Entry
         The shipped ones.
+    part : str
+        Which one it is of several sets of worlds with tables of their own; empty where there is one.
     """
 
     name: str
@@ -79,6 +81,12 @@ class Protocol:
     rules: Mapping[str, Any]
     judge: Judge
     entries: Mapping[str, Entry]
+    part: str = ""
+
+    @property
+    def title(self) -> str:
+        """Name, part and version."""
+        return " ".join(word for word in (self.name, self.part, self.version) if word)
 
     def entry(self, name: str) -> Entry:
         """Return a shipped entry; raises ConfigError if there is none of this name."""

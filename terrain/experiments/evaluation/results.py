@@ -109,6 +109,7 @@ def results_of(protocol: Protocol, entries: Sequence[Entry], rows: Sequence[Row]
     head = {
         "protocol": {
             "name": protocol.name,
+            "part": protocol.part,
             "version": protocol.version,
             "hash": protocol.hash,
             "about": protocol.about,
@@ -154,7 +155,7 @@ def read_results(file: Path) -> Results:
 
 def shipped_results(protocol: Protocol) -> Results | None:
     """Return the results of the shipped entries that come with the package; None if there are none."""
-    file = SHIPPED / f"{protocol.name}_{protocol.version}.json"
+    file = SHIPPED / f"{protocol.title.replace(' ', '_')}.json"
     return read_results(file) if file.is_file() else None
 
 

@@ -272,8 +272,9 @@ def test_marks_of_the_terminal_in_results_are_shown_as_they_are():
     assert all(text in console.file.getvalue() for text in ("a[/b]", "1 [/c]", "[/d]"))
 
 
-def test_the_results_that_ship_are_of_this_version_and_name_how_they_were_made():
-    protocol, results = OUTDOOR, shipped_results(OUTDOOR)
+@pytest.mark.parametrize("protocol", [OUTDOOR, INDOOR, MOVING], ids=lambda protocol: protocol.title)
+def test_the_results_that_ship_are_of_this_version_and_name_how_they_were_made(protocol):
+    results = shipped_results(protocol)
     hashes = {protocol.trial_hash(trial) for trial in protocol.trials}
     shipped = {row["entry"] for row in results.rows}
     assert shipped <= set(protocol.entries) and shipped
