@@ -130,7 +130,13 @@ class AbstractNavigationServer(MapInterface):
         if isinstance(runtime.clock, SimClock):
             runtime.clock.hang_guard = parameters.hang_guard
 
-    def warm_up(self, start: Pose, goal: Pose, on_step: Callable[[str], None] = lambda text: None) -> None:
+    def warm_up(
+        self,
+        start: Pose,
+        goal: Pose,
+        on_step: Callable[[str], None] = lambda text: None,
+        only_defaults: bool = False,
+    ) -> None:
         """Call every planner and controller once, without moving, so that their kernels are compiled before a goal.
 
         Parameters
@@ -139,9 +145,13 @@ class AbstractNavigationServer(MapInterface):
             In the global frame; a plan between them is made with every planner.
         on_step : callable
             Called with a text before each plugin's turn: its name, and which of how many it is.
+        only_defaults : bool
+            Call the first planner and the first controller only, where no real time passes while others are compiled.
         """
         path = Path.from_poses([start, goal])
         planners, controllers = self.plugins.all_of(PluginKind.PLANNER), self.plugins.all_of(PluginKind.CONTROLLER)
+        if only_defaults:
+            planners, controllers = planners[:1], controllers[:1]
         count = len(planners) + len(controllers)
         for number, planner in enumerate(planners, start=1):
             on_step(f"warming up planner {planner.name} ({number} of {count})")

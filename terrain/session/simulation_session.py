@@ -114,7 +114,7 @@ class SimulationSession(NavigationSession, ABC):
         self.on_close(self.loop.stop)
         self.loop.publish()
         options.on_step("compiling kernels (first run only)")
-        server.warm_up(simulation.robot.pose(), self.goals[0], options.on_step)
+        server.warm_up(simulation.robot.pose(), self.goals[0], options.on_step, only_defaults=not options.wall_clock)
 
     @property
     @abstractmethod
