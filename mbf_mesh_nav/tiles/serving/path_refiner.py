@@ -63,6 +63,8 @@ class PathRefiner(MapPlugin, AbstractRefiner):
             lengths = polyline_lengths(rest.positions)
             count = max(int(np.searchsorted(lengths, PIECE * self._map.spacing, side="right")), 2)
             result = self._piece(rest[:count], moment, cancel_token)
+            if cancel_token.cancelled:
+                return RefineResult(RefinePathOutcome.CANCELED, cancel_token.reason)
             if not result.success or result.path is None:
                 place = position_text(rest.positions[0]) if len(rest) else "its begin"
                 return replace(result, message=f"in the piece from {place}: {result.message}")
@@ -76,8 +78,6 @@ class PathRefiner(MapPlugin, AbstractRefiner):
             rest = _joined(result.path[kept:], rest[count:])
 
     def _piece(self, piece: Path, moment: Moment, cancel_token: CancelToken) -> RefineResult:
-        if cancel_token.cancelled:
-            return RefineResult(RefinePathOutcome.CANCELED, cancel_token.reason)
         if not len(piece):
             return RefineResult(RefinePathOutcome.SUCCESS, "nothing to refine", piece)
         margin = MARGIN * self._map.spacing
