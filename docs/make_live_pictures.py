@@ -31,8 +31,9 @@ SIZE = (1500, 940)  # pixels of the window
 WIDTH = 1100  # of the picture
 START_TIMEOUT = 300.0  # s until the page is served
 CLOSE_NOTES = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(button => button.click())"
-FOLLOW = """[...document.querySelectorAll('label')].find(label => label.textContent.trim() === 'follow the robot')
-  .closest('div').parentElement.querySelector('input[type=checkbox]').click()"""
+FOLLOW = (
+    """[...document.querySelectorAll('#mbf-visitor button')].find(button => button.textContent === 'Follow').click()"""
+)
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def serve(shot: Shot, folder: Path) -> str:
 async def photograph(page: Any, shot: Shot, address: str) -> bytes:
     """Open the page, click, wait for the moment, and take the picture."""
     await page.open(address)
-    await page.read("What goes on")
+    await page.wait_for("document.getElementById('mbf-visitor') !== null")
     await page.wait_for("document.querySelector('canvas') !== null")
     for click in shot.clicks:
         await page.evaluate(click)

@@ -41,6 +41,9 @@ class MapHooks(Protocol):
     def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
         """The answer of a controller with a command by which the robot touches nothing that moves."""
 
+    def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
+        """What the robot would touch if it kept a command for a time [s], and where; empty = nothing."""
+
     def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
         """Keep the map alive while a goal of this kind runs."""
 

@@ -1,30 +1,28 @@
 """Draws a behaviour tree: as text for a terminal, as dot for Graphviz, as an SVG of our own that needs neither.
 
 In the SVG a tree grows from left to right: one row for each leaf, parents beside the middle of their children. Boxes
-with round corners are leaves; a running tree shows each node's status by the colour of its edge.
+with round corners are leaves; a running tree shows each node's status by the colour of its edge, and fills what runs.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape
 
-from py_trees.behaviour import Behaviour
-from py_trees.common import Status
+from mbf_abstract.executives.tree_events import IDLE, NodeState, in_order
 
-from mbf_abstract.executives.tree_events import in_order
+if TYPE_CHECKING:
+    from py_trees.behaviour import Behaviour
 
 ROW_HEIGHT = 34.0
 BOX_HEIGHT = 26.0
 CHARACTER_WIDTH = 7.0
 COLUMN_GAP = 34.0
 MARGIN = 12.0
-EDGE_COLOUR = {
-    Status.INVALID: "#8a8f98",
-    Status.RUNNING: "#1f6feb",
-    Status.SUCCESS: "#1a7f37",
-    Status.FAILURE: "#cf222e",
-}
+RUNNING = "RUNNING"
+STATUS_COLOURS = {IDLE: "#8a8f98", RUNNING: "#1f6feb", "SUCCESS": "#1a7f37", "FAILURE": "#cf222e"}
 FORMATS = ("text", "dot", "svg")
 
 
@@ -57,13 +55,21 @@ def as_dot(tree: Behaviour) -> str:
 
 def as_svg(tree: Behaviour) -> str:
     """Return the tree as one SVG document."""
+    nodes = [NodeState(_label(node), type(node).__name__, depth, node.status.value) for node, depth in in_order(tree)]
+    return svg_of(nodes)
+
+
+def svg_of(nodes: Sequence[NodeState]) -> str:
+    """Draw nodes, parents first, as one SVG document; their messages are tooltips, and running ones are filled."""
     widest: dict[int, float] = {}  # box of each depth
-    for node, depth in in_order(tree):
-        widest[depth] = max(widest.get(depth, 0.0), _width(node))
-    columns = [widest[depth] for depth in range(len(widest))]
+    for node in nodes:
+        widest[node.depth] = max(widest.get(node.depth, 0.0), _width(node))
+    columns = [widest.get(depth, 0.0) for depth in range(max(widest, default=-1) + 1)]
     boxes: list[_Box] = []
-    rows = _place(tree, 0, 0.0, columns, boxes)
-    width = MARGIN + sum(columns) + COLUMN_GAP * (len(columns) - 1) + MARGIN
+    rows = 0.0
+    while len(boxes) < len(nodes):
+        rows += _place(nodes, rows, columns, boxes)
+    width = MARGIN + sum(columns) + COLUMN_GAP * max(len(columns) - 1, 0) + MARGIN
     height = 2.0 * MARGIN + rows * ROW_HEIGHT
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}" height="{height:g}" '
@@ -74,31 +80,33 @@ def as_svg(tree: Behaviour) -> str:
 
 @dataclass
 class _Box:
-    """A placed node: left edge, middle height, width, and where its line to the parent begins."""
+    """A placed node: left edge, middle height, whether it is a leaf, and where its line to the parent begins."""
 
-    node: Behaviour
+    node: NodeState
     x: float
     y: float
-    width: float
+    is_leaf: bool = True
     parent: _Box | None = None
 
     def draw(self) -> list[str]:
-        colour = EDGE_COLOUR[self.node.status]
-        radius = 2 if self.node.children else 10
+        colour, width = STATUS_COLOURS[self.node.status], _width(self.node)
         lines = []
         if self.parent is not None:
-            start, middle = self.parent.x + self.parent.width, self.x - COLUMN_GAP / 2.0
+            start, middle = self.parent.x + _width(self.parent.node), self.x - COLUMN_GAP / 2.0
             lines.append(
                 f'<path d="M{start:g} {self.parent.y:g} H{middle:g} V{self.y:g} H{self.x:g}" fill="none" '
                 f'stroke="{colour}"/>'
             )
+        fill, text = (colour, "#fff") if self.node.status == RUNNING else ("#f6f8fa", "#000")
         lines.append(
-            f'<rect x="{self.x:g}" y="{self.y - BOX_HEIGHT / 2:g}" width="{self.width:g}" height="{BOX_HEIGHT:g}" '
-            f'rx="{radius}" fill="#f6f8fa" stroke="{colour}"/>'
+            f'<rect x="{self.x:g}" y="{self.y - BOX_HEIGHT / 2:g}" width="{width:g}" height="{BOX_HEIGHT:g}" '
+            f'rx="{10 if self.is_leaf else 2}" fill="{fill}" stroke="{colour}">'
+            f"<title>{escape(f'{self.node.type}: {self.node.message}')}</title></rect>"
         )
-        middle_x = self.x + self.width / 2.0
-        text = escape(_label(self.node))
-        lines.append(f'<text x="{middle_x:g}" y="{self.y + 4:g}" text-anchor="middle">{text}</text>')
+        lines.append(
+            f'<text x="{self.x + width / 2.0:g}" y="{self.y + 4:g}" text-anchor="middle" fill="{text}" '
+            f'pointer-events="none">{escape(self.node.name)}</text>'
+        )
         return lines
 
 
@@ -106,21 +114,20 @@ def _label(node: Behaviour) -> str:
     return f"{node.name} ({type(node).__name__})"
 
 
-def _width(node: Behaviour) -> float:
-    return CHARACTER_WIDTH * len(_label(node)) + 12.0
+def _width(node: NodeState) -> float:
+    return CHARACTER_WIDTH * len(node.name) + 12.0
 
 
-def _place(node: Behaviour, depth: int, row: float, columns: list[float], boxes: list[_Box]) -> float:
-    """Place a node and all below it from ``row`` on; returns the number of rows they take."""
-    x = MARGIN + sum(columns[:depth]) + COLUMN_GAP * depth
-    box = _Box(node, x, 0.0, _width(node))
+def _place(nodes: Sequence[NodeState], row: float, columns: Sequence[float], boxes: list[_Box]) -> float:
+    """Place the next node and all below it from ``row`` on; returns the number of rows they take."""
+    node = nodes[len(boxes)]
+    box = _Box(node, MARGIN + sum(columns[: node.depth]) + COLUMN_GAP * node.depth, 0.0)
     boxes.append(box)
-    rows, children = 0.0, []
-    for child in node.children:
-        children.append(len(boxes))
-        rows += _place(child, depth + 1, row + rows, columns, boxes)
-    for index in children:
-        boxes[index].parent = box
+    rows = 0.0
+    while len(boxes) < len(nodes) and nodes[len(boxes)].depth > node.depth:
+        child = len(boxes)
+        rows += _place(nodes, row + rows, columns, boxes)
+        boxes[child].parent, box.is_leaf = box, False
     rows = max(rows, 1.0)
     box.y = MARGIN + (row + rows / 2.0) * ROW_HEIGHT
     return rows

@@ -135,6 +135,10 @@ class MapInterface(PluginHost):
         """The answer of a controller with a command by which the robot touches nothing that moves; as it is here."""
         return answer
 
+    def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
+        """What the robot would touch, and where, if it kept ``command`` for ``duration`` [s]; empty = nothing."""
+        return ""
+
     def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
         """Keep the map alive while a goal of this kind runs."""
         return nullcontext()

@@ -131,6 +131,16 @@ class MapServer(AbstractNavigationServer):
             return ControlResult(ExePathOutcome.TF_ERROR, str(error))
         return self._contact_guard.judge(navigation_map, there, velocity, answer, self.runtime.clock.now())
 
+    def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
+        """What the robot would touch on the map that it drives on; see ``NavigationMap.obstacle_ahead``.
+
+        Raises TransformError where the pose is not known on that map.
+        """
+        navigation_map = list(self.served.values())[-1].map
+        there = self.runtime.transforms.transform_pose(pose, navigation_map.frame_id)
+        reason: str = navigation_map.obstacle_ahead(there, command, duration)
+        return reason
+
     @contextmanager
     def using_map(self, kind: PluginKind) -> Iterator[None]:
         """Keep all maps updated: a plugin of any kind may be bound to any of them."""

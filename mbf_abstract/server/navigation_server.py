@@ -166,18 +166,18 @@ class AbstractNavigationServer(MapInterface):
     # --------------------------------------------------------------------------------------- life cycle
     def cancel_all(self, reason: str = "all goals canceled") -> None:
         """Cancel every running goal; never waits."""
-        for action in self._actions():
+        for action in self.actions:
             action.cancel_all(reason)
 
     def pause_all(self) -> None:
         """Pause every running goal: the robot stands, all goals are kept; idempotent, never waits."""
-        for action in self._actions():
+        for action in self.actions:
             for handle in action.unfinished:
                 handle.pause()
 
     def resume_all(self) -> None:
         """Let every paused goal go on."""
-        for action in self._actions():
+        for action in self.actions:
             for handle in action.unfinished:
                 handle.resume()
 
@@ -190,7 +190,7 @@ class AbstractNavigationServer(MapInterface):
             self.runtime.gate.close()
         finally:  # also after a Ctrl-C that came just then
             self._process_end.end()
-            for action in self._actions():
+            for action in self.actions:
                 action.close()
             self.runtime.callbacks.close()
             self.runtime.supervisor.close()
@@ -203,7 +203,9 @@ class AbstractNavigationServer(MapInterface):
     def __exit__(self, *exc: object) -> None:
         self.close()
 
-    def _actions(self) -> list[Any]:
+    @property
+    def actions(self) -> list[Any]:
+        """The actions, the ones that send goals to others first; those made so far while the server is being built."""
         names = ("follow_waypoints", "move_base", "get_path", "exe_path", "recovery", "refine_path")
         return [getattr(self, name) for name in names if hasattr(self, name)]
 

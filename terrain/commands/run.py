@@ -96,7 +96,9 @@ def run(
         60.0, "--ros2-patience", min=1.0, help="With --ros2: end after so long without a command to move, in s."
     ),
     stay: bool = typer.Option(True, "--stay/--no-stay", help="While watched: wait for goals from there at the end."),
-    show: bool = typer.Option(False, "--open", help="Open the replay in the browser at the end."),
+    show: bool = typer.Option(
+        False, "--open", help="Open the page of --view in the browser, and the replay at the end."
+    ),
     quiet: bool = typer.Option(False, "--quiet", help="Print the result without progress."),
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object with verdict and metrics."),
 ) -> None:
@@ -138,7 +140,7 @@ def run(
 
                 page = ViewOptions(view_host, view_port, view_speed, view_token, view_read_only)
                 app = FoxgloveOptions.given(foxglove, foxglove_at, foxglove_token, foxglove_read_only, foxglove_origin)
-                options = watched(replace(options, stay=stay), page if view else None, app, view_speed, live)
+                options = watched(replace(options, stay=stay), page if view else None, app, view_speed, live, show)
             if ros2:
                 from terrain.commands.robot_on_ros import driven_over_ros
 

@@ -7,6 +7,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import typer
+
 if TYPE_CHECKING:
     from mbf_abstract.access.foxglove import FoxgloveOptions
     from terrain.commands.live_line import LiveLine
@@ -17,12 +19,30 @@ if TYPE_CHECKING:
 
 
 def watched(
-    options: RunOptions, page: ViewOptions | None, foxglove: FoxgloveOptions | None, speed: float, live: LiveLine
+    options: RunOptions,
+    page: ViewOptions | None,
+    foxglove: FoxgloveOptions | None,
+    speed: float,
+    live: LiveLine,
+    show: bool = False,
 ) -> RunOptions:
-    """Serve a page of the run, the app Foxglove, or both; ``speed`` is in simulated seconds per second."""
+    """Serve a page of the run, the app Foxglove, or both.
+
+    Parameters
+    ----------
+    options : RunOptions
+    page, foxglove : ViewOptions, FoxgloveOptions
+        None where it is not served.
+    speed : float
+        Simulated seconds per second.
+    live : LiveLine
+        Prints addresses.
+    show : bool
+        Whether the page is opened in the browser.
+    """
     watches: list[Watch] = []
     if page is not None:
-        watches.append(_live_view(page, live))
+        watches.append(_live_view(page, live, show))
     if foxglove is not None:
         watches.append(_live_foxglove(foxglove, speed, live))
 
@@ -36,13 +56,19 @@ def watched(
     return replace(options, watch=watch) if watches else options
 
 
-def _live_view(page: ViewOptions, live: LiveLine) -> Watch:
-    """Return what serves the page of a session while it runs, and prints its address."""
+def _live_view(page: ViewOptions, live: LiveLine, show: bool) -> Watch:
+    """Return what serves the page of a session while it runs, and prints its address or opens it, too."""
     from terrain.viewer.live.session import LiveSession
 
     def watch(session: Session, goals: GoalSequence) -> LiveSession:
         title = _title("live view", session)
-        return LiveSession(session, goals, page, lambda at: live.note(f"{title} at {at}"), live.note)
+
+        def on_page(address: str) -> None:
+            live.note(f"{title} at {address}")
+            if show:
+                typer.launch(address)
+
+        return LiveSession(session, goals, page, on_page, live.note)
 
     return watch
 

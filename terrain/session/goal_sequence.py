@@ -7,10 +7,11 @@ simulator's thread (``DriveLoop.on_tick``), between two steps, so that a goal fr
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import MoveBaseResult
+from mbf_abstract.goals.goal_types import FollowWaypointsFeedback, FollowWaypointsGoal, MoveBaseResult
+from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.outcomes import MoveBaseOutcome
 from terrain.session.arrival import Arrival
 from terrain.session.executives import GoalExecutive
@@ -24,6 +25,16 @@ class AskedGoal:
     """Where to go, and with which plugins; without a name the first ones loaded."""
 
     pose: Pose
+    planner: str = ""
+    controller: str = ""
+
+
+@dataclass(frozen=True)
+class AskedWaypoints:
+    """Waypoints to visit in their order, so many times, with the action ``follow_waypoints`` and these plugins."""
+
+    poses: tuple[Pose, ...]
+    loops: int = 1
     planner: str = ""
     controller: str = ""
 
@@ -46,9 +57,9 @@ class GoalSequence:
     is_waiting : bool
         Whether there is no goal to go to at the moment.
     target : Pose or None
-        The present goal.
+        The present goal, of waypoints the one that the robot goes to.
     last_result : MoveBaseResult or None
-        How the last goal has ended.
+        How the last goal has ended, or the last of the waypoints that were visited together.
     arrivals : list of Arrival
         Where the robot was in truth when navigation reported a goal as reached, goal by goal.
     """
@@ -63,7 +74,8 @@ class GoalSequence:
         self._stay = stay
         self.arrivals: list[Arrival] = []
         self._condition = session.clock.condition()
-        self._next: AskedGoal | None = None
+        self._next: AskedGoal | AskedWaypoints | None = None
+        self._following: AnyGoalHandle | None = None
         self._end: MoveBaseResult | None = None
         self._deadline = float("inf")
         session.loop.on_tick.append(self._watch_time)
@@ -82,15 +94,17 @@ class GoalSequence:
         if self._end is not None and self.last_result is None:
             self.last_result = result = self._end
         while (asked := self._await_goal()) is not None:
-            self._session.recorder.goals.append(asked.pose)
-            for listener in self.on_goal:
-                listener(asked.pose)
+            if isinstance(asked, AskedWaypoints):
+                self._deadline = self._session.simulation.time + limit * asked.loops * len(asked.poses)
+                result = self._follow(asked)
+                continue
+            self._announce(asked.pose)
             self._deadline = self._session.simulation.time + limit
             result = self._visit(asked)
         return result
 
     # ------------------------------------------------------------------------------ from other threads
-    def go_to(self, goal: AskedGoal) -> None:
+    def go_to(self, goal: AskedGoal | AskedWaypoints) -> None:
         """Go there instead of to the present goal and what is left of the scenario."""
         with self._condition:
             self._next = goal
@@ -98,8 +112,10 @@ class GoalSequence:
         self.cancel("a new goal was asked for")
 
     def cancel(self, reason: str) -> None:
-        """Cancel the present goal; the rest of the scenario goes with it."""
+        """Cancel the present goal or waypoints; the rest of the scenario goes with it."""
         self._executive.cancel(reason)
+        if self._following is not None:
+            self._following.cancel(reason)
 
     def end(self, reason: str) -> None:
         """Cancel the present goal and take no more."""
@@ -117,7 +133,42 @@ class GoalSequence:
             self.arrivals.append(Arrival.at(goal.pose, self._session.loop.true_pose, result))
         return result
 
-    def _await_goal(self) -> AskedGoal | None:
+    def _announce(self, goal: Pose) -> None:
+        """Note a goal from outside."""
+        self._session.recorder.goals.append(goal)
+        for listener in self.on_goal:
+            listener(goal)
+
+    def _follow(self, asked: AskedWaypoints) -> MoveBaseResult:
+        """Visit waypoints with the action for them, whatever the executive; each visit counts as a goal of its own."""
+        goal = FollowWaypointsGoal(asked.poses, asked.loops, planner=asked.planner, controller=asked.controller)
+        self._begin_visit(goal, 0)
+        self._following = handle = self._session.navigator.send(goal)
+        ended: list[MoveBaseResult] = []
+        handle.subscribe(lambda handle: self._take_visits(goal, ended, handle.feedback))
+        result = handle.wait()
+        self._following = self.target = None
+        last = result.results[-1] if result.results else MoveBaseResult(result.outcome, result.message)
+        self.last_result = all_of_it = replace(last, outcome=result.outcome, message=result.message)
+        return all_of_it
+
+    def _begin_visit(self, goal: FollowWaypointsGoal, visit: int) -> None:
+        self.target = goal.waypoints[visit % len(goal.waypoints)]
+        self._announce(self.target)
+
+    def _take_visits(
+        self, goal: FollowWaypointsGoal, ended: list[MoveBaseResult], feedback: FollowWaypointsFeedback | None
+    ) -> None:
+        """Note the visits that have ended since the last feedback; on the thread of the action, at that very time."""
+        results = feedback.results if feedback is not None else ()
+        for result in results[len(ended) :]:
+            ended.append(result)
+            if result.success and self.target is not None:
+                self.arrivals.append(Arrival.at(self.target, self._session.loop.true_pose, result))
+                if len(ended) < goal.visits:
+                    self._begin_visit(goal, len(ended))
+
+    def _await_goal(self) -> AskedGoal | AskedWaypoints | None:
         """Wait for the next goal if there may be one; None when the sequence is over."""
         self._deadline = float("inf")
         with self._condition:

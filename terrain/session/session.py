@@ -193,9 +193,9 @@ class Session(SimulationSession):
 
     def _record_sample(self, time: float, pose: Pose, velocity: Twist) -> None:
         self.recorder.sample(time, pose, velocity, self.navigator.server.runtime.gate.last_command)
-        self.recorder.tracked(time, self._tracked_objects)
+        self.recorder.tracked(time, self.tracked_objects)
 
-    def _tracked_objects(self) -> list[TrackedObject]:
+    def tracked_objects(self) -> list[TrackedObject]:
         """What the map knows that the robot drives on, without starting its updates; in the frame of the world."""
         server, world = self.navigator.server, self.recorder.start.frame_id
         try:

@@ -213,7 +213,7 @@ def verify(session, ledger):
     for handle in handles:
         handle.wait(30.0)
     until = time.monotonic() + 30.0  # parts of move_base may end a little later, and callbacks too
-    while (ledger.missing() or any(a.busy for a in session.server._actions())) and time.monotonic() < until:
+    while (ledger.missing() or any(a.busy for a in session.server.actions)) and time.monotonic() < until:
         time.sleep(0.01)
     ends = Counter(event.data["goal_id"] for event in session.recorded(EventKind.GOAL_FINISHED))
     accepted = {event.data["goal_id"] for event in session.recorded(EventKind.GOAL_ACCEPTED)}

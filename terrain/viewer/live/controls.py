@@ -9,6 +9,9 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
+from enum import Enum
+from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 
@@ -16,11 +19,22 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.scenarios.faults import LocalizationJump, SensorFault
 from terrain.sensors.rays import StaticRays
-from terrain.session.goal_sequence import AskedGoal, GoalSequence
+from terrain.session.goal_sequence import AskedGoal, AskedWaypoints, GoalSequence
 from terrain.session.session import Session
 
 MAX_WAITING = 100  # commands; a page that sends more between two steps loses the oldest
 MAX_RANGE = 1e4  # m from the camera to the ground
+MAX_WAYPOINTS = 100
+Ray: TypeAlias = tuple[FloatArray, FloatArray]
+"""Origin (3,) and direction (3,) [m]."""
+
+
+class Placing(str, Enum):
+    """What a click or a drag on the ground is."""
+
+    GOAL = "a goal"
+    WAYPOINT = "a waypoint"
+    NOTHING = "nothing"
 
 
 class LiveControls:
@@ -39,6 +53,9 @@ class LiveControls:
         Plugins for the goals to come; empty = the first ones loaded.
     holding : bool
         Whether goals are paused, those to come as well.
+    placing : Placing
+    waypoints : tuple of Pose
+        Those that were placed.
     """
 
     def __init__(
@@ -47,12 +64,13 @@ class LiveControls:
         self.planner = ""
         self.controller = ""
         self.holding = False
+        self.placing = Placing.GOAL
+        self.waypoints: tuple[Pose, ...] = ()
         self._session = session
         self._sequence = sequence
         self._source, self._place = source, place
         self._server = session.navigator.server
         self._waiting: deque[Callable[[], None]] = deque(maxlen=MAX_WAITING)
-        self._ground: StaticRays | None = None
 
     def post(self, command: Callable[[], None]) -> None:
         """Have ``command`` called between two steps of the world; from any thread, never waits."""
@@ -70,25 +88,79 @@ class LiveControls:
             self._server.pause_all()  # in every step, for goals that an executive has sent since the last one
 
     # ------------------------------------------------------------------------------- commands, to be posted
-    def go_to(self, origin: FloatArray, direction: FloatArray) -> None:
-        """Go to where a ray (3,), (3,) [m] hits the ground, heading away from where the robot is now."""
-        place = self._where_it_hits(np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64))
+    def place(self, ray: Ray, facing: Ray | None = None) -> None:
+        """Make a goal or a waypoint, depending on ``placing``, where a ray hits the ground.
+
+        Parameters
+        ----------
+        ray : Ray
+        facing : Ray, optional
+            Through what the robot is to face there; without it, it faces on from where it comes.
+        """
+        if self.placing is Placing.NOTHING:
+            return
+        place = self.ground_at(*ray)
         if place is None:
             self._log("there is no ground where the click was")
             return
         x, y, z = place.tolist()
-        robot = self._session.simulation.robot.pose()
-        self.go_to_pose(Pose.planar(x, y, math.atan2(y - robot.y, x - robot.x), z))
+        along = self.waypoints and self.placing is Placing.WAYPOINT
+        before = self.waypoints[-1] if along else self._session.simulation.robot.pose()
+        yaw = math.atan2(y - before.y, x - before.x) if facing is None else _yaw_towards(place, *facing)
+        pose = Pose.planar(x, y, yaw, z)
+        self.go_to_pose(pose) if self.placing is Placing.GOAL else self.add_waypoint(pose)
 
     def go_to_pose(self, goal: Pose) -> None:
         """Go there."""
-        self._log("new goal", x=round(goal.x, 3), y=round(goal.y, 3), z=round(goal.z, 3))
+        self._log("new goal", x=round(goal.x, 3), y=round(goal.y, 3), z=round(goal.z, 3), yaw=round(goal.yaw, 3))
         self._sequence.go_to(AskedGoal(goal, self.planner, self.controller))
 
+    def add_waypoint(self, waypoint: Pose) -> None:
+        """Add one to the list.
+
+        Raises
+        ------
+        ValueError
+            The list is full.
+        """
+        if len(self.waypoints) >= MAX_WAYPOINTS:
+            raise ValueError(f"there are {MAX_WAYPOINTS} waypoints already")
+        self.waypoints = (*self.waypoints, waypoint)
+
+    def remove_waypoint(self, number: int) -> None:
+        """Take the one of a number, counted from 1, off the list, if there is one; those after it move up."""
+        self.waypoints = tuple(one for index, one in enumerate(self.waypoints, 1) if index != number)
+
+    def clear_waypoints(self) -> None:
+        """Empty the list; a sequence that is driven goes on."""
+        self.waypoints = ()
+
+    def drive_waypoints(self, loops: int = 1) -> None:
+        """Visit the waypoints in their order instead of the present goal, so many times.
+
+        Raises
+        ------
+        ValueError
+            There are none.
+        """
+        if not self.waypoints:
+            raise ValueError("there are no waypoints to drive")
+        self._log("drive waypoints", waypoints=len(self.waypoints), loops=loops)
+        self._sequence.go_to(AskedWaypoints(self.waypoints, loops, self.planner, self.controller))
+
     def cancel(self) -> None:
-        """Cancel the present goal."""
+        """Cancel the present goal, or the waypoints that are driven."""
         self._log("cancel")
         self._sequence.cancel(f"canceled in {self._place}")
+
+    def take_over(self) -> None:
+        """Cancel what drives the robot, because somebody drives it by hand."""
+        self._log("teleoperation")
+        self._sequence.cancel(f"teleoperation in {self._place}")
+
+    def note_end_of_teleoperation(self, reason: str) -> None:
+        """Log why nobody drives the robot by hand any more."""
+        self._log("end of teleoperation", reason=reason)
 
     def hold(self, holding: bool) -> None:
         """Pause all goals, or let them go on."""
@@ -112,13 +184,27 @@ class LiveControls:
         self._sequence.end(reason)
 
     # -----------------------------------------------------------------------------------------------------
-    def _where_it_hits(self, origin: FloatArray, direction: FloatArray) -> FloatArray | None:
-        if self._ground is None:
-            self._ground = StaticRays(*self._session.world.ground)
+    def ground_at(self, origin: FloatArray, direction: FloatArray) -> FloatArray | None:
+        """Place (3,) [m] where a ray first hits the ground; None where it does not."""
+        origin, direction = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
         direction = direction / np.linalg.norm(direction)
-        distance = float(self._ground.distances(origin[None], direction[None], MAX_RANGE)[0])
+        distance = float(self.ground_rays.distances(origin[None], direction[None], MAX_RANGE)[0])
         return origin + distance * direction if math.isfinite(distance) else None
+
+    @cached_property
+    def ground_rays(self) -> StaticRays:
+        """Rays at the ground of the world."""
+        return StaticRays(*self._session.world.ground)
 
     def _log(self, what: str, **facts: object) -> None:
         """Log what a visitor has done to the run."""
         self._session.events.emit(EventKind.CUSTOM, self._source, what=what, **facts)
+
+
+def _yaw_towards(place: FloatArray, origin: FloatArray, direction: FloatArray) -> float:
+    """Heading [rad] from a place (3,) to where a ray comes to its height, or to the far end of one that never does."""
+    origin, direction = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
+    drop = float(origin[2] - place[2])
+    sinks = float(direction[2]) * drop < 0.0
+    end = origin + (-drop / direction[2] if sinks else MAX_RANGE) * direction
+    return math.atan2(float(end[1] - place[1]), float(end[0] - place[0]))

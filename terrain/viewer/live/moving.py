@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,11 +13,14 @@ from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.view import FieldView
 from mbf_abstract.plugins import PlannedMotion, PluginKind
+from terrain.recording.recorded_objects import NUMBER, RADIUS, RecordedObjects, X, Z
 from terrain.session.session import Session
 from terrain.viewer.live.overlay import Overlay
-from terrain.viewer.pictures.colours import GOAL, PLANNED
+from terrain.viewer.pictures.colours import GOAL, PLANNED, TRACKED
+from terrain.viewer.replay.scene_content import velocity_arrows
 from terrain.viewer.scene import (
     LINE_LIFT,
+    LINE_WIDTH,
     ActorModels,
     RobotModel,
     add_path,
@@ -32,10 +37,12 @@ FIELD_COLOUR = (120, 150, 215)
 AHEAD_COLOUR = (245, 60, 190)
 TRACK_PERIOD = 10  # samples of the recorder between two looks at the track
 MAX_TRACK = 2000  # points of the track that are drawn
+TRAIL = 50  # places of a tracked object that are drawn: those of five seconds
+CORNERS = 16  # of the circle around one
 
 
 class MovingThings:
-    """Robot, actors, goal, plan, vector field, local plan, scans and track.
+    """Robot, actors, tracked objects, goal, plan, vector field, local plan, scans and track.
 
     Parameters
     ----------
@@ -62,6 +69,8 @@ class MovingThings:
         self._ahead = Overlay(gui, "local plan")
         self._field = Overlay(gui, "vector field")
         self._scan = Overlay(gui, "lidar")
+        self._tracked = Overlay(gui, "tracked objects")
+        self._trails: dict[int, deque[FloatArray]] = {}
         session.navigator.server.get_path.listeners.append(self._take_plan)
 
     def show_goal(self, goal: Pose) -> None:
@@ -74,6 +83,7 @@ class MovingThings:
         self._actors.place(as_row(actor.pose()) for actor in self._session.recorder.actors)
         self._show_plan(self._path if is_driving else None)
         self._show_scans()
+        self._show_tracked(time)
         track = self._session.simulation.track
         self._track.update(len(track) // TRACK_PERIOD, lambda: self._draw_track(track))
         if self._goal is not None:
@@ -142,6 +152,39 @@ class MovingThings:
             points = np.concatenate([scan.points for scan in scans])
             stamps = tuple(scan.stamp for scan in scans)
             self._scan.update(stamps, lambda: add_scan(self._scene, "/scan", points))
+
+    def _show_tracked(self, time: float) -> None:
+        rows = RecordedObjects.of(time, self._session.tracked_objects()).rows
+        known = rows[:, NUMBER].astype(int).tolist()
+        self._trails = {number: self._trails.get(number, deque(maxlen=TRAIL)) for number in known}
+        for trail, row in zip(self._trails.values(), rows, strict=True):
+            trail.append(row[X : Z + 1] + np.array([0.0, 0.0, LINE_LIFT]))
+        self._tracked.update(rows.tobytes(), lambda: self._draw_tracked(rows))
+
+    def _draw_tracked(self, rows: FloatArray) -> Any:
+        segments = tracked_segments(rows, [np.array(trail) for trail in self._trails.values()])
+        if not len(segments):
+            return None
+        return self._scene.add_line_segments(
+            "/tracked", segments.astype(np.float32), TRACKED, thickness=LINE_WIDTH, thickness_units="screen"
+        )  # fmt: skip
+
+
+def tracked_segments(rows: FloatArray, trails: Sequence[FloatArray]) -> FloatArray:
+    """Line segments (n, 2, 3) [m] of tracked objects: an arrow for the velocity, a circle, and where each was before.
+
+    Parameters
+    ----------
+    rows : (k, COLUMNS) float64
+        Those of ``RecordedObjects``.
+    trails : sequence of (m, 3) float64
+        Places [m], oldest first.
+    """
+    angles = 2.0 * np.pi * np.arange(CORNERS + 1) / CORNERS
+    ring = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))])
+    lines = [row[X : Z + 1] + (0.0, 0.0, LINE_LIFT) + row[RADIUS] * ring for row in rows]
+    joined = [np.stack([line[:-1], line[1:]], axis=1) for line in (*lines, *trails)]
+    return np.concatenate([velocity_arrows(rows).reshape(-1, 2, 3), *joined])
 
 
 def as_row(pose: Pose) -> FloatArray:

@@ -10,19 +10,26 @@ from typing import Any
 
 import numpy as np
 
+from mbf_abstract.executives.tree_drawing import svg_of
 from mbf_abstract.geometry.tilt import tilt_of
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session
+from terrain.viewer.live.cameras import Cameras
 from terrain.viewer.live.controls import LiveControls
-from terrain.viewer.live.follow import FollowCamera
 from terrain.viewer.live.ground import Ground
-from terrain.viewer.live.log import LiveLog
+from terrain.viewer.live.log import SPAN, LiveLog, recent
 from terrain.viewer.live.moving import MovingThings
 from terrain.viewer.live.panel import DrivePanel, FaultPanel
 from terrain.viewer.live.plots import History, Plots
+from terrain.viewer.live.readout import Readout
 from terrain.viewer.live.status_html import SMALL, actions_html, headline_html, lines_html
-from terrain.viewer.reports.tree_html import tree_html
-from terrain.viewer.scene import add_surroundings, look_at_route, pin_height
+from terrain.viewer.live.stick import Stick
+from terrain.viewer.live.visitors import Visitors
+from terrain.viewer.live.waypoint_list import WaypointList
+from terrain.viewer.reports.timeline import PANEL, timeline_svg
+from terrain.viewer.reports.tree_html import tree_html, worth_showing
+from terrain.viewer.scene import add_surroundings, pin_height
+from terrain.viewer.server.visitor_channel import VisitorChannel
 
 PANEL_WIDTH = 320  # pixels
 FARTHER = 1.6  # than in a replay, because the panels leave less room for the scene and the labels at its ends
@@ -40,6 +47,9 @@ class LivePage:
     sequence : GoalSequence
     controls : LiveControls
     log : LiveLog
+    stick : Stick
+    channel : VisitorChannel
+        Of the server.
     steered : bool
         Whether the page may steer; else there are no buttons, and the choices of the view are disabled.
     """
@@ -51,6 +61,8 @@ class LivePage:
         sequence: GoalSequence,
         controls: LiveControls,
         log: LiveLog,
+        stick: Stick,
+        channel: VisitorChannel,
         steered: bool = True,
     ) -> None:
         self._server = server_page
@@ -61,12 +73,14 @@ class LivePage:
         gui, start = server_page.gui, session.recorder.finish()
         gui.configure_theme(show_logo=False, show_share_button=False)
         add_surroundings(server_page.scene, start)
-        look_at_route(server_page.initial_camera, start, FARTHER)
+        cameras = Cameras(server_page, start, session.world.ground, controls.ground_rays, FARTHER)
+        readout = Readout(session.navigator.server)
+        self._visitors = Visitors(server_page, channel, controls, stick, cameras, readout)
         with gui.add_folder("Drive"):
             self._headline = gui.add_html("")
-            self._drive = DrivePanel(server_page, controls, session) if steered else None
+            self._drive = DrivePanel(server_page, controls, stick, session) if steered else None
+        self._waypoints = WaypointList(server_page, controls, sequence, pin_height(start)) if steered else None
         with gui.add_folder("Show"):
-            self._camera = FollowCamera(server_page)
             self._ground = Ground(server_page, session.navigator.server, session.world.ground)
             self.things = MovingThings(server_page, session, pin_height(start))
         if steered:
@@ -86,13 +100,16 @@ class LivePage:
         """Draw the present state; ``time`` is simulated time [s]."""
         with self._server.atomic():
             self.things.show(time, self._status(time), is_driving=self._sequence.target is not None)
-            self._camera.show(np.array(self._session.simulation.robot.pose().position))
+            self._visitors.show(np.array(self._session.simulation.robot.pose().position))
             self._ground.show()
             if self._drive is not None:
                 self._drive.show()
+            if self._waypoints is not None:
+                self._waypoints.show()
             self._show_texts(time)
             if self._frame % PLOT_EVERY == 0:
                 self._plots.show(history)
+                self._show_timeline(time)
         self._frame += 1
 
     def _add_left_panel(self, gui: Any) -> None:
@@ -103,6 +120,7 @@ class LivePage:
             with gui.add_folder("Actions"):
                 self._actions = gui.add_html("")
             with gui.add_folder("Last two minutes"):
+                self._timeline = gui.add_html("")
                 self._plots = Plots(gui)
             with gui.add_folder("Behaviour tree"):
                 self._tree = gui.add_html("")
@@ -122,6 +140,15 @@ class LivePage:
         ):
             if element.content != content:
                 element.content = content
+
+    def _show_timeline(self, time: float) -> None:
+        """The actions as bars, and the tree as a graph."""
+        snapshot, begin = self._log.snapshot(), max(time - SPAN, 0.0)
+        bars = timeline_svg(tuple(recent(snapshot.timeline, begin)), begin, time, PANEL)
+        content = f'<div style="padding:0 0.8em">{bars}</div>'
+        if self._timeline.content != content:
+            self._timeline.content = content
+        self._visitors.show_tree(svg_of(list(worth_showing(snapshot.nodes))) if snapshot.nodes else "")
 
     def _status(self, time: float) -> str:
         """Text above the robot."""

@@ -8,28 +8,36 @@ from typing import Any, get_args
 from mbf_abstract.plugins import PluginKind
 from terrain.scenarios.faults import LocalizationJump, SensorFault
 from terrain.session.session import Session
-from terrain.viewer.live.controls import LiveControls
+from terrain.viewer.live.controls import LiveControls, Placing
+from terrain.viewer.live.stick import Stick
 
 JUMP = "localisation jumps"
 SENSOR_FAULTS = tuple(get_args(SensorFault.model_fields["type"].annotation))
-HINT = "Click on the ground: the robot goes there. Drag to turn the view, right button to move it, wheel to zoom."
+HINT = (
+    "Click on the ground: the robot goes there. Drag with Shift: it arrives with that heading. Drag to turn the view, "
+    "right button to move it, wheel to zoom."
+)
 
 
 class DrivePanel:
-    """Goals: click, cancel, pause, plugins, end.
+    """Goals: what a click is, cancel, pause, plugins, end.
 
     Parameters
     ----------
     server_page : viser.ViserServer
     controls : LiveControls
+    stick : Stick
     session : Session
     """
 
-    def __init__(self, server_page: Any, controls: LiveControls, session: Session) -> None:
+    def __init__(self, server_page: Any, controls: LiveControls, stick: Stick, session: Session) -> None:
         gui = server_page.gui
-        self._controls = controls
+        self._controls, self._stick = controls, stick
         gui.add_markdown(HINT)
-        self._clicks = gui.add_checkbox("a click is a new goal", True)
+        self._placing = gui.add_dropdown(
+            "a click is", tuple(placing.value for placing in Placing), hint="What a click or a drag with Shift places"
+        )
+        self._placing.on_update(self._take_placing)
         server_page.scene.on_click()(self._take_click)
         gui.add_button("Cancel", color="red", hint="End the present goal").on_click(
             lambda _: controls.post(controls.cancel)
@@ -41,6 +49,10 @@ class DrivePanel:
         self._controller = gui.add_dropdown("controller", plugins.names(PluginKind.CONTROLLER))
         for choice in (self._planner, self._controller):
             choice.on_update(self._take_choice)
+        self._share = gui.add_slider(
+            "stick, % of limits", 10, 100, 10, round(100 * stick.share), hint="How fast the stick drives at its end"
+        )
+        self._share.on_update(self._take_share)
         gui.add_button("End the run", hint="Stop, write the results and close this page").on_click(
             lambda _: controls.post(lambda: controls.end("ended in the live view"))
         )
@@ -52,11 +64,16 @@ class DrivePanel:
             self._hold.label = label
 
     def _take_click(self, event: Any) -> None:
-        if self._clicks.value:
-            self._controls.post(lambda: self._controls.go_to(event.ray_origin, event.ray_direction))
+        self._controls.post(lambda: self._controls.place((event.ray_origin, event.ray_direction)))
+
+    def _take_placing(self, event: Any) -> None:
+        self._controls.placing = Placing(self._placing.value)
 
     def _take_hold(self, event: Any) -> None:
         self._controls.post(lambda: self._controls.hold(not self._controls.holding))
+
+    def _take_share(self, event: Any) -> None:
+        self._stick.share = 0.01 * self._share.value
 
     def _take_choice(self, event: Any) -> None:
         planner, controller = self._planner.value, self._controller.value

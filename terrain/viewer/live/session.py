@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 
 from mbf_abstract.access.page_access import LOOPBACK, PageAccess, Role, is_loopback
 from mbf_abstract.events import EventKind
@@ -23,8 +24,11 @@ from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.orderly_end import orderly_ctrl_c
 from terrain.viewer.live.page import LivePage
 from terrain.viewer.live.plots import PERIOD, UNWATCHED_PERIOD, History
+from terrain.viewer.live.stick import Stick
 from terrain.viewer.server.page_server import page_server
+from terrain.viewer.server.visitor_channel import VisitorChannel
 
+SCRIPT = Path(__file__).with_name("visitor.js")
 FRAME_PERIOD = 0.1  # s of wall time between two drawings
 
 
@@ -116,15 +120,22 @@ class LiveSession:
         self._wall = WallClock()
         self._next_frame = 0.0
         self._pace = Pace(self._wall)
+        self._stick = Stick(
+            session.navigator.server, self._wall, self.controls.take_over, self.controls.note_end_of_teleoperation
+        )
         self._page: LivePage | None = None
         self._exits = ExitStack()
 
     def __enter__(self) -> LiveSession:
         session, access = self._session, self._options.access()
         with ExitStack() as exits:
-            server = exits.enter_context(page_server(self._options.port, access, "mbf " + session.scenario.name))
+            channel = VisitorChannel(SCRIPT.read_text("utf-8"))
+            title = "mbf " + session.scenario.name
+            server = exits.enter_context(page_server(self._options.port, access, title, channel))
             steered = Role.STEER in access.roles.values()
-            self._page = page = LivePage(server, session, self._sequence, self.controls, self._log, steered)
+            self._page = page = LivePage(
+                server, session, self._sequence, self.controls, self._log, self._stick, channel, steered
+            )
             exits.enter_context(orderly_ctrl_c(lambda: self.controls.post(lambda: self.controls.end("Ctrl-C"))))
             self.address = access.address(server.get_port(), Role.STEER) or ""
             self.watching_address = access.address(server.get_port(), Role.WATCH) or ""
@@ -152,6 +163,8 @@ class LiveSession:
 
     def _after_step(self, time: float) -> None:
         self.controls.work_off()
+        if self._page is not None:
+            self._stick.step(self.controls.holding)
         self._pace.wait(time, self._speed())
         if self._page is None:
             return
@@ -160,10 +173,11 @@ class LiveSession:
             self._show(self._page, time)
         except Exception as error:  # whatever the page's library may raise, the run does not depend on it
             self._page = None
+            self._stick.stop("the page has failed")
             self._session.events.emit(EventKind.FAULT, "live_view", type=type(error).__name__, message=str(error))
 
     def _speed(self) -> float:
-        """Simulated seconds per second; in real time while the run waits for a goal. A wall clock needs no pacing."""
+        """Simulated seconds per second; in real time without a goal, as by hand. A wall clock needs no pacing."""
         if isinstance(self._session.clock, WallClock):
             return 0.0
         return self._options.speed or (1.0 if self._sequence.is_waiting else 0.0)

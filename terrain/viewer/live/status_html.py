@@ -18,9 +18,8 @@ SMALL = "font-size:0.8em;line-height:1.35;padding:0 0.8em"
 
 def actions_html(server: AbstractNavigationServer, snapshot: Snapshot) -> str:
     """One row for each action: the state of its running goals, else how its last goal has ended."""
-    actions = (server.move_base, server.get_path, server.exe_path, server.recovery, server.refine_path)
     rows = []
-    for action in actions:
+    for action in server.actions:
         running = action.unfinished
         end = snapshot.ends.get(action.name)
         if running:

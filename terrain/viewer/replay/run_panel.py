@@ -14,13 +14,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbf_abstract.events import Event, EventKind
+from mbf_abstract.executives.tree_drawing import STATUS_COLOURS
 from mbf_abstract.executives.tree_events import SYMBOLS
 from terrain.recording.recording import Recording
 from terrain.viewer.pictures.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, SCAN, TRACKED, Colour, slope_legend
 from terrain.viewer.pictures.incident_marks import mark_of
 from terrain.viewer.pictures.shading import FLAT_GROUND
 from terrain.viewer.reports.event_lines import is_shown, line_of
-from terrain.viewer.reports.tree_html import COLOURS, INDENT
+from terrain.viewer.reports.tree_html import INDENT
 
 SHOWN_LINES = 8
 MAX_LINES = 2000  # a run with more leaves out the oldest
@@ -71,7 +72,7 @@ def _data(events: tuple[Event, ...]) -> dict[str, Any]:
         "lead": LEAD,
         "lines": [[line.time, f"{line.source} {line.text}", line.colour] for line in lines[-MAX_LINES:]],
         "symbols": SYMBOLS,
-        "colours": COLOURS,
+        "colours": STATUS_COLOURS,
         "indent": INDENT,
         "shown": SHOWN_LINES,
     }

@@ -10,17 +10,29 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from html import escape
+from typing import NamedTuple
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.viewer.reports.event_lines import NOTABLE, colour_of, event_text
 
-ACTIONS = ("move_base", "get_path", "exe_path", "recovery", "refine_path")
+ACTIONS = ("follow_waypoints", "move_base", "get_path", "exe_path", "recovery", "refine_path")
 MARKS_ROW = "incidents, stops"
-WIDTH, ROW, BAR = 900, 30, 18
-LETTER = 7.5  # pixels; labels are wide enough for the longest name
 GOOD, BAD, NEITHER = "#2da44e", "#cf222e", "#9aa4b2"
-MAX_TICKS = 10
+
+
+class Size(NamedTuple):
+    """Sizes in pixels of a timeline: its width, a row, a bar, a letter of the labels; and how many ticks it has."""
+
+    width: int
+    row: int
+    bar: int
+    letter: float
+    ticks: int
+
+
+PAGE = Size(900, 30, 18, 7.5, 10)
+PANEL = Size(290, 17, 10, 5.2, 4)
 
 
 @dataclass(frozen=True)
@@ -62,55 +74,58 @@ def plugin_bars(events: tuple[Event, ...]) -> list[Bar]:
     return bars
 
 
-def timeline_svg(events: tuple[Event, ...]) -> str:
-    """Draw all rows; a short text where no goal was accepted."""
-    goals = action_bars(events)
+def timeline_svg(events: tuple[Event, ...], begin: float = 0.0, end: float | None = None, size: Size = PAGE) -> str:
+    """Draw all rows from ``begin`` to ``end`` [s], by default to the last event; a short text without any goal."""
+    end = max(event.time for event in events) if end is None and events else end or 0.0
+    goals = [bar for bar in action_bars(events) if bar.end is None or bar.end >= begin]
     if not goals:
         return "<p>no goal was accepted</p>"
     bars = [*goals, *plugin_bars(events)]
-    marks = [event for event in events if event.kind in NOTABLE]
+    marks = [event for event in events if event.kind in NOTABLE and event.time >= begin]
     rows = [action for action in ACTIONS if any(bar.row == action for bar in bars)]
     rows += sorted({bar.row for bar in bars} - set(rows)) + ([MARKS_ROW] if marks else [])
-    frame = _Frame(rows, max(max(event.time for event in events), 1e-3))
+    frame = _Frame(rows, begin, max(end, begin + 1e-3), size)
     parts = [*frame.labels(), *map(frame.bar, bars), *map(frame.mark, marks), *frame.ticks()]
-    return f'<svg viewBox="0 0 {WIDTH} {frame.height}" width="{WIDTH}" role="img">{"".join(parts)}</svg>'
+    return f'<svg viewBox="0 0 {size.width} {frame.height}" width="{size.width}" role="img">{"".join(parts)}</svg>'
 
 
 class _Frame:
     """Where rows and times are in the picture."""
 
-    def __init__(self, rows: list[str], last: float) -> None:
-        self._rows, self._last = rows, last
-        self._left = LETTER * max(map(len, rows)) + 10
-        self._scale = (WIDTH - self._left - 20) / last
-        self._bottom = ROW * len(rows)
+    def __init__(self, rows: list[str], first: float, last: float, size: Size) -> None:
+        self._rows, self._first, self._last, self._size = rows, first, last, size
+        self._left = size.letter * max(map(len, rows)) + 10
+        self._scale = (size.width - self._left - 20) / (last - first)
+        self._bottom = size.row * len(rows)
         self.height = self._bottom + 24
 
     def labels(self) -> Iterator[str]:
         for index, row in enumerate(self._rows):
-            yield f'<text x="0" y="{ROW * index + 19}" font-size="13">{escape(row)}</text>'
+            middle = self._size.row * (index + 0.5) + 4
+            yield f'<text x="0" y="{middle:g}" font-size="{round(1.74 * self._size.letter)}">{escape(row)}</text>'
 
     def bar(self, bar: Bar) -> str:
-        end = self._last if bar.end is None else bar.end
+        begin, end = max(bar.begin, self._first), self._last if bar.end is None else bar.end
         outcome = "" if bar.outcome is None else outcome_name(bar.outcome)
         note = bar.note or ("not finished" if bar.end is None else "")
         title = escape(": ".join(part for part in (bar.row, outcome, note) if part))
-        x, y = self._x(bar.begin), self._y(bar.row) + (ROW - BAR) // 2
+        x, y = self._x(begin), self._y(bar.row) + (self._size.row - self._size.bar) // 2
         return (
-            f'<rect x="{x:.1f}" y="{y}" width="{max(2.0, (end - bar.begin) * self._scale):.1f}" height="{BAR}" rx="2" '
+            f'<rect x="{x:.1f}" y="{y}" width="{max(2.0, (end - begin) * self._scale):.1f}" '
+            f'height="{self._size.bar}" rx="2" '
             f'fill="{_colour(bar.outcome)}" fill-opacity="0.75">'
             f"<title>{title}, {bar.begin:.2f} s to {end:.2f} s</title></rect>"
         )
 
     def mark(self, event: Event) -> str:
         """A diamond: red for a fault and what fails a run, amber for other incidents, else grey."""
-        x, y = self._x(event.time), self._y(MARKS_ROW) + ROW // 2
+        x, y = self._x(event.time), self._y(MARKS_ROW) + self._size.row // 2
         title = escape(f"{event.time:.2f} s: {event.source}: {event.kind.value}: {event_text(event)}")
         return f'<path d="M{x:.1f} {y - 7}l6 7l-6 7l-6 -7z" fill="{colour_of(event)}"><title>{title}</title></path>'
 
     def ticks(self) -> Iterator[str]:
-        step = _round_step(self._last / MAX_TICKS)
-        for index in range(int(self._last / step) + 1):
+        step = _round_step((self._last - self._first) / self._size.ticks)
+        for index in range(math.ceil(self._first / step), int(self._last / step) + 1):
             x = self._x(step * index)
             yield f'<line x1="{x:.1f}" x2="{x:.1f}" y1="0" y2="{self._bottom}" stroke="#ddd"/>'
             yield (
@@ -119,10 +134,10 @@ class _Frame:
             )
 
     def _x(self, time: float) -> float:
-        return self._left + time * self._scale
+        return self._left + (time - self._first) * self._scale
 
     def _y(self, row: str) -> int:
-        return ROW * self._rows.index(row)
+        return self._size.row * self._rows.index(row)
 
 
 def _round_step(least: float) -> float:

@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from html import escape
 
+from mbf_abstract.executives.tree_drawing import RUNNING, STATUS_COLOURS
 from mbf_abstract.executives.tree_events import IDLE, SYMBOLS, NodeState
 
-RUNNING = "RUNNING"
-COLOURS = {IDLE: "#8a8f98", RUNNING: "#1f6feb", "SUCCESS": "#1a7f37", "FAILURE": "#cf222e"}
 INDENT = 12  # pixels
 
 
@@ -33,5 +32,5 @@ def _line(node: NodeState) -> str:
     at_work = "font-weight:600;" if node.status == RUNNING else ""
     message = f' <span style="opacity:0.75">{escape(node.message)}</span>' if node.status == "FAILURE" else ""
     tip = escape(f"{node.type}: {node.message}", quote=True)
-    style = f"padding-left:{INDENT * node.depth}px;color:{COLOURS[node.status]};{at_work}"
+    style = f"padding-left:{INDENT * node.depth}px;color:{STATUS_COLOURS[node.status]};{at_work}"
     return f'<div title="{tip}" style="{style}">{SYMBOLS[node.status]} {escape(node.name)}{message}</div>'

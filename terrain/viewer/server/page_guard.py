@@ -17,11 +17,11 @@ from typing import Any
 
 from mbf_abstract.access.page_access import PageAccess
 from terrain.viewer.server.page_messages import is_allowed
+from terrain.viewer.server.visitor_channel import MAX_REFUSED, POLICY_VIOLATION, PREFIX, VisitorChannel
 
 MAX_MESSAGE = 64 * 1024  # bytes; messages of a browser are far shorter
 MAX_VISITORS = 32
-MAX_REFUSED = 100  # wrong messages after which a visitor is disconnected
-TRY_AGAIN_LATER, POLICY_VIOLATION = 1013, 1008  # WebSocket close codes (RFC 6455, 7.4.1)
+TRY_AGAIN_LATER = 1013  # WebSocket close code (RFC 6455, 7.4.1)
 HEADERS = {
     "Referrer-Policy": "no-referrer",  # the token is in the address
     "Cache-Control": "no-store",
@@ -37,6 +37,12 @@ _starting = threading.Lock()  # one server is started at a time, see ``installed
 class PageGuard:
     """Guards one page.
 
+    Parameters
+    ----------
+    access : PageAccess
+    channel : VisitorChannel, optional
+        Takes the connections of visitors' own scripts.
+
     Attributes
     ----------
     is_installed : bool
@@ -45,10 +51,11 @@ class PageGuard:
         The page's controls by their identifiers; to be set once the page exists.
     """
 
-    def __init__(self, access: PageAccess) -> None:
+    def __init__(self, access: PageAccess, channel: VisitorChannel | None = None) -> None:
         self.is_installed = False
         self.controls: Mapping[str, Any] = {}
         self._access = access
+        self._channel = channel
         self._visitors = 0
 
     @contextmanager
@@ -111,6 +118,9 @@ class PageGuard:
 
     async def _handle(self, handler: Callable[[Any], Awaitable[None]], connection: Any) -> None:
         found = self._access.role_and_path(connection.request.path)
+        if found is not None and self._channel is not None and found[1].startswith(PREFIX):
+            await self._channel.serve(connection, *found)
+            return
         if found is None or self._visitors >= MAX_VISITORS:
             await connection.close(TRY_AGAIN_LATER, "too many visitors")
             return

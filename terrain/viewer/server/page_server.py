@@ -11,11 +11,16 @@ from typing import Any
 from mbf_abstract.access.page_access import NOBODY, PageAccess
 from terrain.viewer.pictures.picture import ViewerMissing
 from terrain.viewer.server.page_guard import PageGuard
+from terrain.viewer.server.visitor_channel import VisitorChannel
 
 
 @contextmanager
-def page_server(port: int, access: PageAccess = NOBODY, label: str | None = None) -> Iterator[Any]:
+def page_server(
+    port: int, access: PageAccess = NOBODY, label: str | None = None, channel: VisitorChannel | None = None
+) -> Iterator[Any]:
     """Start a viser server that is open only to visitors whom ``access`` admits, and stop it afterwards.
+
+    With a ``channel`` its script runs in the page of every visitor.
 
     Raises
     ------
@@ -27,7 +32,7 @@ def page_server(port: int, access: PageAccess = NOBODY, label: str | None = None
     except ImportError as error:
         raise ViewerMissing(f"a page of a run needs viser: pip install 'mbf-flex[sim]' ({error})") from error
     _check_interface(access.host)
-    guard = PageGuard(access)
+    guard = PageGuard(access, channel)
     try:
         with redirect_stdout(io.StringIO()), guard.installed():  # viser's banner is not for those who asked for JSON
             server = viser.ViserServer(host=access.host, port=port, label=label, verbose=False)
@@ -37,6 +42,8 @@ def page_server(port: int, access: PageAccess = NOBODY, label: str | None = None
         if not guard.is_installed:
             raise ViewerMissing(f"viser {viser.__version__} cannot be run behind access control, so it is not used")
         guard.controls = server.gui._gui_input_handle_from_uuid
+        if channel is not None:
+            channel.attach(server)
         yield server
     finally:
         with redirect_stdout(io.StringIO()):

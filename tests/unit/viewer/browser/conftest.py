@@ -73,11 +73,30 @@ class Page:
         for kind, button in (("mouseMoved", "none"), ("mousePressed", "left"), ("mouseReleased", "left")):
             await self.command("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1)
 
+    async def drag(self, start, end, modifiers=0):
+        """Press the left mouse button at a place of the window, in pixels, and release it at another; 8 is Shift."""
+        for kind, (x, y) in (
+            ("mouseMoved", start),
+            ("mousePressed", start),
+            ("mouseMoved", end),
+            ("mouseReleased", end),
+        ):
+            button = {"button": "none"} if kind == "mouseMoved" else {"button": "left", "clickCount": 1}
+            await self.command("Input.dispatchMouseEvent", type=kind, x=x, y=y, modifiers=modifiers, **button)
+
     async def key(self, key):
         """Press and release a key, named as in JavaScript."""
+        await self.key_down(key)
+        await self.key_up(key)
+
+    async def key_down(self, key, code=""):
+        """Press a key and hold it; ``code`` names its place on the keyboard, as in JavaScript."""
         text = {"text": key} if len(key) == 1 else {}
-        await self.command("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
-        await self.command("Input.dispatchKeyEvent", type="keyUp", key=key)
+        await self.command("Input.dispatchKeyEvent", type="keyDown", key=key, code=code, **text)
+
+    async def key_up(self, key, code=""):
+        """Release a key."""
+        await self.command("Input.dispatchKeyEvent", type="keyUp", key=key, code=code)
 
     async def resize(self, width, height):
         """Make the page as large as a window, or a phone's, of this size in pixels."""
@@ -89,6 +108,17 @@ class Page:
         find = f"[...document.querySelectorAll('button')].find(b => b.textContent.trim() === {json.dumps(label)})"
         await self.wait_for(f"{find} !== undefined")
         await self.evaluate(f"{find}.click()")
+
+    async def choose(self, label, option):
+        """Choose an option of the list with this label."""
+        name = f"[...document.querySelectorAll('label')].find(l => l.textContent.trim() === {json.dumps(label)})"
+        chosen = (
+            f"[...document.querySelectorAll('[role=option]')].find(o => o.textContent.trim() === {json.dumps(option)})"
+        )
+        await self.wait_for(f"{name} !== undefined")
+        await self.evaluate(f"document.getElementById({name}.htmlFor).click()")
+        await self.wait_for(f"{chosen} !== undefined")
+        await self.evaluate(f"{chosen}.click()")
 
     async def read(self, text):
         """Wait until the page shows a text."""

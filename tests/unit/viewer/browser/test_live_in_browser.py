@@ -29,6 +29,12 @@ SCENARIO = {
     "actors": [{"type": "walker", "route": [[6.0, 7.0], [6.5, 7.0]], "speed": 0.1}],
 }
 SPEED = "0.1"  # of real time: however slow the browser is, the robot is still under way when the page asks for more
+COSTMAP = {  # the same on cells
+    "backend": "costmap",
+    "navigation": {"costmap": CONFIG.replace("outdoor_mesh", "outdoor_costmap")},
+}
+VALUES = "document.getElementById('mbf-values').innerText"
+STICK = "document.getElementById('mbf-stick').parentElement.innerText"
 CANVAS = "document.querySelector('canvas')"
 PLACE = f"(() => {{ const r = {CANVAS}.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
 
@@ -40,11 +46,16 @@ DISABLED = """(() => {
 
 @pytest.fixture
 def served_run(tmp_path, request):
-    """Start ``mbf run --view`` on open ground; returns the process, the page's address and the folder of results."""
-    (tmp_path / "meadow.yaml").write_text(yaml.safe_dump(SCENARIO))
+    """Start ``mbf run --view`` on open ground; returns the process, the page's address and the folder of results.
+
+    The parameter is further options, or what the scenario has otherwise.
+    """
+    parameter = getattr(request, "param", ())
+    changes, more = (parameter, ()) if isinstance(parameter, dict) else ({}, parameter)
+    (tmp_path / "meadow.yaml").write_text(yaml.safe_dump({**SCENARIO, **changes}))
     start = [sys.executable, "-c", "from mbf_abstract.cli import main; main()", "run", tmp_path / "meadow.yaml"]
     options = ["--out", tmp_path / "run", "--json", "--executive", "navigation"]
-    view = ["--view", "--view-port", "18400", "--view-speed", SPEED, *getattr(request, "param", ())]
+    view = ["--view", "--view-port", "18400", "--view-speed", SPEED, *more]
     process = subprocess.Popen([*start, *options, *view], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     for line in process.stderr:
         if "live view at " in line:
@@ -93,15 +104,75 @@ def test_a_page_for_watching_only_shows_the_run_without_a_button_that_could_be_p
     async def watch(page):
         await page.open(address)
         await page.read("▶ follow path")
-        await page.read("follow the robot")  # the last control of the page that steers nothing
+        await page.read("lidar")  # the last control of the page that steers nothing
+        await page.press("Overview")  # everybody chooses the own view
         text = await page.evaluate("document.body.innerText")
         disabled = await page.evaluate(DISABLED)
         return page.errors, text, disabled
 
     errors, text, disabled = chromium.visit(watch)
 
-    assert errors == [] and "follow the robot" in disabled
-    assert not [word for word in ("Cancel", "Pause", "End the run", "Inject", "a click is a new goal") if word in text]
+    assert errors == [] and "lidar" in disabled
+    steering = ("Cancel", "Pause", "End the run", "Inject", "a click is", "Waypoints", "WASD", "Place")
+    assert not [word for word in steering if word in text]
+
+
+@pytest.mark.parametrize("served_run", [COSTMAP], ids=["costmap"], indirect=True)
+def test_a_drag_is_a_goal_with_a_heading_waypoints_are_driven_and_the_stick_drives_while_it_is_held(
+    chromium, served_run, tmp_path
+):
+    process, address, folder = served_run
+
+    async def steer(page):
+        await page.open(address)
+        await page.wait_for(f"{CANVAS} !== null && {CANVAS}.clientWidth > 300")
+        await page.read("WASD")
+        await page.press("Pause")  # so that the robot reaches nothing, however slow the browser is
+        x, y = await page.evaluate(PLACE)
+        await page.drag((x, y), (x + 60, y), modifiers=8)
+        await page.read("what: new goal")
+        await page.wait_for(f"{VALUES}.includes('place')")
+        values = await page.evaluate(VALUES)
+        await page.choose("a click is", "a waypoint")
+        await page.click(x, y)
+        await page.drag((x - 80, y + 60), (x - 80, y), modifiers=8)
+        await page.read("· 2: ")
+        await page.press("Drive the waypoints")
+        await page.read("▶ 1: ")
+        await page.press("Tree")
+        await page.wait_for("document.querySelector('#mbf-tree svg') !== null")
+        png = await page.screenshot()
+        await page.press("Resume")
+        await page.key_down(" ", "Space")
+        await page.key_down("w", "KeyW")
+        await page.wait_for(f"{STICK}.includes('driving')")
+        await page.read("what: teleoperation")
+        await page.key_up(" ", "Space")
+        await page.read("what: end of teleoperation")
+        await page.wait_for(f"{STICK}.includes('WASD')")
+        await page.press("Follow")
+        await page.press("End the run")
+        return page.errors, values, png
+
+    errors, values, png = chromium.visit(steer)
+    process.stdout.read()
+
+    (tmp_path / "by_hand.png").write_bytes(png)
+    assert errors == []
+    assert "place" in values and "global_costmap" in values and "local_costmap" in values
+    assert_the_log_holds_what_was_done_by_hand(list(read_events(folder / "events.jsonl")))
+
+
+def assert_the_log_holds_what_was_done_by_hand(events):
+    asked = {event.data["what"]: event.data for event in events if event.source == "live_view"}
+    assert {"new goal", "drive waypoints", "teleoperation", "end of teleoperation", "end"} <= set(asked)
+    assert asked["drive waypoints"]["waypoints"] == 2
+    held = [event.kind for event in events if event.data.get("holder") == "teleoperation"]
+    assert held[0] is EventKind.LEASE_GRANTED and EventKind.LEASE_REVOKED in held
+    ended = [
+        event.data for event in events if event.kind is EventKind.GOAL_FINISHED and event.source == "follow_waypoints"
+    ]
+    assert [data["message"] for data in ended] == ["teleoperation in the live view"]
 
 
 def assert_the_log_holds_what_was_asked_for(events):

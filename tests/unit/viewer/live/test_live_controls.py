@@ -24,7 +24,7 @@ def reported(run):
 
 def test_the_robot_goes_where_the_click_hits_the_ground_instead_of_to_the_scenarios_goal(steered):
     run = steered()
-    run.at(2.0, lambda: run.controls.go_to(above(5.0, 7.0), DOWN))
+    run.at(2.0, lambda: run.controls.place((above(5.0, 7.0), DOWN)))
 
     result = run.visit_goals()
 
@@ -39,7 +39,7 @@ def test_the_robot_goes_where_the_click_hits_the_ground_instead_of_to_the_scenar
 
 def test_a_click_beside_the_ground_changes_nothing(steered):
     run = steered()
-    run.at(2.0, lambda: run.controls.go_to(above(500.0, 0.0), DOWN))
+    run.at(2.0, lambda: run.controls.place((above(500.0, 0.0), DOWN)))
 
     assert run.visit_goals().success
     assert reported(run) == ["there is no ground where the click was"]
@@ -72,7 +72,7 @@ def test_a_paused_robot_stands_until_it_is_released_and_then_arrives(steered, ex
 def test_a_goal_that_is_clicked_while_the_robot_is_held_waits_too(steered):
     run = steered()
     run.at(2.0, lambda: run.controls.hold(True))
-    run.at(3.0, lambda: run.controls.go_to(above(5.0, 7.0), DOWN))
+    run.at(3.0, lambda: run.controls.place((above(5.0, 7.0), DOWN)))
     run.at(5.0, end(run))
 
     assert run.visit_goals().outcome_name == "CANCELED"
@@ -81,7 +81,7 @@ def test_a_goal_that_is_clicked_while_the_robot_is_held_waits_too(steered):
 
 def test_the_chosen_planner_makes_the_plans_of_the_goals_to_come(steered):
     run = steered()
-    run.at(1.0, lambda: run.controls.choose("cvp", "follower"), lambda: run.controls.go_to(above(5.0, 7.0), DOWN))
+    run.at(1.0, lambda: run.controls.choose("cvp", "follower"), lambda: run.controls.place((above(5.0, 7.0), DOWN)))
 
     assert run.visit_goals().success
     assert [event.data["plugin"] for event in run.events(EventKind.PLAN)] == ["astar", "cvp"]
@@ -109,7 +109,7 @@ def test_injected_faults_befall_the_sensor_and_the_localisation_and_end(steered)
 def test_a_clicked_goal_has_the_scenarios_time_limit_of_its_own(steered, meadow):
     run = steered()
     run.session.scenario = meadow.model_copy(update={"time_limit": 2.0})
-    run.at(3.0, lambda: run.controls.go_to(above(9.0, 8.0), DOWN))
+    run.at(3.0, lambda: run.controls.place((above(9.0, 8.0), DOWN)))
 
     result = run.visit_goals()
 

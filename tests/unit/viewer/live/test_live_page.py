@@ -13,9 +13,15 @@ from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.page import LivePage
 from terrain.viewer.live.plots import History
+from terrain.viewer.live.stick import Stick
 from terrain.viewer.server.page_server import page_server
+from terrain.viewer.server.visitor_channel import VisitorChannel
 
 NODES = ("ground", "map", "local_map", "lethal", "robot", "plan", "track", "ahead", "field", "scan", "goal_asked_for")
+
+
+def stick_of(session, controls):
+    return Stick(session.navigator.server, session.clock, controls.take_over, controls.note_end_of_teleoperation)
 
 
 def look_once(session, controls, sequence, time, port):
@@ -24,7 +30,7 @@ def look_once(session, controls, sequence, time, port):
     log, history = LiveLog(), History()
     session.events.add_sink(log)
     with page_server(port) as server:
-        page = LivePage(server, session, sequence, controls, log)
+        page = LivePage(server, session, sequence, controls, log, stick_of(session, controls), VisitorChannel(""))
         sequence.on_goal.append(page.things.show_goal)
 
         def look(now):
@@ -44,7 +50,7 @@ def look_once(session, controls, sequence, time, port):
 def test_on_a_mesh_the_page_shows_layers_plan_field_and_what_is_forbidden(steered):
     run = steered("navigation")
     run.at(
-        0.6, lambda: run.controls.choose("cvp", "follower"), lambda: run.controls.go_to((9.0, 7.0, 50.0), (0, 0, -1))
+        0.6, lambda: run.controls.choose("cvp", "follower"), lambda: run.controls.place(((9.0, 7.0, 50.0), (0, 0, -1)))
     )
 
     nodes, words = look_once(run.session, run.controls, run.sequence, 3.0, 18220)
@@ -73,7 +79,8 @@ def test_people_and_other_robots_are_drawn_where_they_are_now(meadow):
     actors = (Walker(type="walker", route=route), OtherRobot(type="robot", route=route, start=4.0))
     with Session(meadow.model_copy(update={"actors": actors})) as session, page_server(18240) as server:
         sequence = GoalSequence(session, make_executive("move_base", session.navigator))
-        page = LivePage(server, session, sequence, LiveControls(session, sequence), LiveLog())
+        controls = LiveControls(session, sequence)
+        page = LivePage(server, session, sequence, controls, LiveLog(), stick_of(session, controls), VisitorChannel(""))
         shown = []
         for time in (1.0, 2.0):
             session.clock.sleep(1.0)

@@ -9,7 +9,6 @@ from mbf_abstract.geometry import AckermannCommand, Pose, Twist, quaternion_from
 from mbf_abstract.maps.view import FieldView, GridView
 from mbf_abstract.time.pace import MAX_LAG, Pace
 from mbf_abstract.time.sim_clock import SimClock
-from terrain.viewer.live.follow import first_direction
 from terrain.viewer.live.ground import costs_at, legend_html
 from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.moving import AHEAD, AHEAD_STEPS, field_arrows, motion_of, predicted_points
@@ -73,15 +72,6 @@ def test_the_ramp_gets_darker_with_cost_and_what_is_forbidden_looks_like_a_wall(
     lightness = colours[:9] @ [0.2126, 0.7152, 0.0722]
     assert (np.diff(lightness) < 0.0).all()
     assert tuple(colours[9]) == WALL
-
-
-@pytest.mark.parametrize("look", [(10.0, 0.0, 8.0), (3.0, -4.0, 0.1), (0.0, 0.0, 5.0)])
-def test_a_following_camera_looks_from_the_same_side_and_never_from_below_the_ground(look):
-    direction = first_direction(np.array(look))
-
-    assert np.linalg.norm(direction) == pytest.approx(1.0)
-    assert direction[2] > 0.4
-    assert np.cross(direction[:2], look[:2]) == pytest.approx(0.0) and direction[:2] @ look[:2] >= 0.0
 
 
 def test_an_overlay_is_drawn_again_only_when_it_has_changed_and_goes_with_its_box():

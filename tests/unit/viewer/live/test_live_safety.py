@@ -40,7 +40,7 @@ def refused(events):
 def test_a_command_that_fails_is_noted_and_the_run_goes_on(steered):
     run = steered()
     run.at(1.0, lambda: 1 / 0, lambda: run.controls.inject("no fault"))
-    run.at(1.0, lambda: run.controls.go_to("far", None))
+    run.at(1.0, lambda: run.controls.place(("far", None)))
 
     result = run.visit_goals()
 

@@ -1,0 +1,99 @@
+"""Who holds the stick of the page: one visitor at a time, as long as the page reports it."""
+
+import pytest
+
+from mbf_abstract.events import EventKind
+from terrain.viewer.live.stick import SILENCE, Stick
+
+
+@pytest.fixture
+def by_hand(steered):
+    """A run with a stick; the wall's time is that of the run."""
+    run = steered()
+    controls = run.controls
+    stick = Stick(
+        run.session.navigator.server, run.session.clock, controls.take_over, controls.note_end_of_teleoperation
+    )
+    run.session.loop.on_tick.append(lambda time: stick.step(controls.holding))
+    return run, stick
+
+
+def hold(run, stick, begin, end, turn=0.0, forward=1.0, visitor=1):
+    """Report it as a page does, ten times a second."""
+    for tenth in range(round(10 * begin), round(10 * end)):
+        run.at(0.1 * tenth, lambda: stick.hold(visitor, turn, forward))
+
+
+def log(run):
+    return [(e.data["what"], e.data.get("reason")) for e in run.events(EventKind.CUSTOM, source="live_view")]
+
+
+def test_who_takes_the_stick_cancels_the_goal_and_the_robot_stands_afterwards(by_hand):
+    run, stick = by_hand
+    hold(run, stick, 2.0, 4.0, turn=0.5)
+    run.at(4.0, lambda: stick.release(1))
+    run.at(6.0, lambda: run.controls.end("enough"))
+
+    result = run.visit_goals()
+
+    assert result.outcome_name == "CANCELED" and "teleoperation in the live view" in result.message
+    assert run.poses[2.5].distance_to(run.poses[4.0]) > 0.2
+    assert run.poses[5.0].distance_to(run.poses[6.0]) < 0.01
+    assert log(run)[:2] == [("teleoperation", None), ("end of teleoperation", "the stick was released")]
+
+
+def test_a_page_that_falls_silent_has_released_the_stick(by_hand):
+    run, stick = by_hand
+    hold(run, stick, 2.0, 3.0)
+    run.at(5.0, lambda: run.controls.end("enough"))
+
+    run.visit_goals()
+
+    assert ("end of teleoperation", "the page that held the stick is silent") in log(run)
+    (ended,) = [e.time for e in run.events(EventKind.CUSTOM) if e.data["what"] == "end of teleoperation"]
+    assert ended - 2.9 == pytest.approx(SILENCE, abs=0.1)
+    assert run.poses[4.0].distance_to(run.poses[5.0]) < 0.01
+
+
+def test_the_second_visitor_gets_the_stick_when_the_first_one_has_released_it(by_hand):
+    run, stick = by_hand
+    answers = []
+    hold(run, stick, 2.0, 3.0)
+    run.at(2.5, lambda: answers.append(stick.hold(2, 0.0, -1.0)), lambda: stick.release(2))
+    run.at(3.0, lambda: stick.release(1), lambda: answers.append(stick.hold(2, 0.0, -1.0)))
+    run.at(3.2, lambda: run.controls.end("enough"))
+
+    run.visit_goals()
+
+    assert answers == [False, True]
+
+
+def test_a_paused_robot_does_not_follow_the_stick(by_hand):
+    run, stick = by_hand
+    run.at(2.0, lambda: run.controls.hold(True))
+    hold(run, stick, 3.0, 5.0)
+    run.at(5.0, lambda: stick.release(1), lambda: run.controls.end("enough"))
+
+    run.visit_goals()
+
+    assert stick.status(is_paused=True).startswith("paused")
+    assert run.poses[3.0].position == pytest.approx(run.poses[5.0].position, abs=0.01)
+    assert "teleoperation" not in [what for what, _ in log(run)]
+
+
+def test_the_stick_at_its_end_asks_for_its_share_of_the_limits(by_hand):
+    run, stick = by_hand
+    run.session.navigator.server.set_parameters(max_vel_x=0.8, min_vel_x=-0.2, max_vel_theta=1.0)
+    stick.share = 0.5
+    speeds = {}
+    run.session.loop.on_tick.append(
+        lambda time: speeds.update({round(time, 1): run.session.navigator.server.runtime.gate.last_command})
+    )
+    hold(run, stick, 2.0, 3.0, turn=-1.0, forward=0.5)
+    hold(run, stick, 3.0, 4.0, forward=-1.0)
+    run.at(4.0, lambda: stick.release(1), lambda: run.controls.end("enough"))
+
+    run.visit_goals()
+
+    assert (speeds[2.8].vx, speeds[2.8].wz) == pytest.approx((0.2, -0.5))
+    assert (speeds[3.8].vx, speeds[3.8].wz) == pytest.approx((-0.1, 0.0))
