@@ -1,12 +1,16 @@
 """Full circle: a cloud of a known world, the map built from it, a plan on the built map, the drive in the true world.
 
     python benchmarks/maps.py [--quick] [--json] [--workers 2] [--terrains 40] [--buildings 10] [--sizes 1,10]
+                              [--levels 0,1,2] [--seed 7000] [--maps true,built,posed,coarse]
 
 Terrains are those of ``mbf bench outdoor`` of every level, with posts, on seeds that nothing was chosen on. Their
 clouds have 100 points on a square metre with noise of 2 cm, crowns above the posts, and grass of 10 cm on a fifth of
 the ground. Buildings are the shipped bridge and garage, scanned on all sides with the same density and noise. Each is
-driven once on the built map and once on the true one, of which the faces below the posts are cut out. Rates are over
-the terrains with a route (by the judge of ``mbf bench``, posts included). ``--sizes`` are millions of points, each
+driven once on the built map and once on the true one, of which the faces below the posts are cut out. ``--maps`` adds
+worse ones of the terrains: ``posed`` is built from scans whose poses are wrong (5 cm along each axis and 2 degrees of
+heading, half of it drift that lasts for some twenty scans; a robot knows its roll and pitch from gravity), ``coarse``
+is the built one with a quarter of the vertices and heights that are wrong by up to 3 cm. Rates are over the terrains
+with a route (by the judge of ``mbf bench``, posts included). ``--sizes`` are millions of points, each
 built in a process of its own; CPU time and peak memory are of that process.
 """
 
@@ -19,12 +23,15 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import fast_simplification
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
 from mbf_mesh_nav.building.map_build import write_map
 from mbf_mesh_nav.building.map_facts import map_facts
@@ -32,6 +39,7 @@ from mbf_mesh_nav.building.surface import BuiltSurface, build_surface
 from mbf_mesh_nav.files.map_header import MapHeader
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.repair import REPAIRS, checked_mesh
 from terrain.experiments.evaluation.outdoor import FROM_CORNER, LEVELS, SIZE, generated
 from terrain.experiments.evaluation.reachability import is_reachable
 from terrain.physics.robot_models import HUSKY
@@ -49,9 +57,21 @@ from terrain.worlds.surface import Surface
 FloatArray = NDArray[np.float64]
 DENSITY, NOISE, GRASS, GRASS_SHARE = 100.0, 0.02, 0.1, 0.2
 FIRST_SEED, CLOUD_STREAM = 7000, 99
+POSE_ERROR, HEADING_ERROR, DRIFT_SCANS = 0.05, np.radians(2.0), 20
+SCAN_STEP, SCAN_REACH = 1.0, 4.0
+COARSE_SHARE, COARSE_HEIGHTS = 0.25, 0.03
+KINDS = ("true", "built", "posed", "coarse")
 POSTS = Forest(x_range=(2.0, SIZE[0] - 2.0), y_range=(2.0, SIZE[1] - 2.0), count=12, gap=2.4, diameter=0.3, height=1.5)
 MAP_FILE = "mesh_map.mesh_file"
 Row = dict[str, Any]
+
+
+class BuiltMap(NamedTuple):
+    """A mesh, and the standard error of its heights [m]."""
+
+    vertices: FloatArray
+    faces: IntArray
+    height_error: float
 
 
 def scan_ground(ground: Heightfield, rng: np.random.Generator, grass_share: float) -> FloatArray:
@@ -88,8 +108,46 @@ def scan_surface(surface: Surface, rng: np.random.Generator) -> FloatArray:
     return points + rng.normal(0.0, NOISE, points.shape)
 
 
-def terrain_row(level: int, seed: int, folder: Path) -> tuple[Scenario, Row]:
-    """Build the map of one terrain with posts; the scenario, and how the map compares with the truth."""
+def misplaced(points: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Points as a robot with wrong poses maps them, from scans on lanes across the ground.
+
+    Each point is of a scan within reach, drawn at random, so that scans overlap. Half of the variance of an error is
+    noise of its own, half is shared by neighbouring scans.
+    """
+    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    columns, rows = np.ceil((high - low) / SCAN_STEP).astype(np.int64) + 1
+    count = int(columns * rows)
+    kept = np.exp(-1.0 / DRIFT_SCANS)
+    drift = np.empty((count, 4))
+    drift[0] = rng.normal(size=4)
+    for number in range(1, count):
+        drift[number] = kept * drift[number - 1] + np.sqrt(1.0 - kept * kept) * rng.normal(size=4)
+    sizes = np.sqrt(0.5) * np.array([POSE_ERROR, POSE_ERROR, POSE_ERROR, HEADING_ERROR])
+    errors = sizes * (drift + rng.normal(size=(count, 4)))
+    seen_from = points[:, :2] + rng.uniform(-SCAN_REACH, SCAN_REACH, (len(points), 2))
+    column, row = np.clip(np.rint((seen_from - low) / SCAN_STEP), 0, (columns - 1, rows - 1)).astype(np.int64).T
+    scan = row * columns + np.where(row % 2 == 0, column, columns - 1 - column)  # there on one lane, back on the next
+    arm = points[:, :2] - low - SCAN_STEP * np.column_stack([column, row])
+    turn = errors[scan, 3]
+    moved = np.column_stack([-turn * arm[:, 1], turn * arm[:, 0], np.zeros(len(points))])
+    return points + errors[scan, :3] + moved
+
+
+def coarser(built: BuiltMap, rng: np.random.Generator) -> BuiltMap:
+    """A quarter of the vertices, with wrong heights; the error is what the vertices of the built map show."""
+    vertices, faces, error = built
+    points, corners = fast_simplification.simplify(vertices, faces, target_reduction=1.0 - COARSE_SHARE)
+    mesh, _ = checked_mesh(points, corners, [name for name in REPAIRS if name != "small_components"])
+    points = mesh.vertices + [0.0, 0.0, 1.0] * rng.uniform(-COARSE_HEIGHTS, COARSE_HEIGHTS, (len(mesh.vertices), 1))
+    locator = MeshMap.from_arrays(points, mesh.faces).locator
+    above = vertices + np.array([0.0, 0.0, 5.0])
+    face, length = locator.cast_rays(above, np.tile([0.0, 0.0, -1.0], (len(vertices), 1)))
+    distances = length[face >= 0] - 5.0
+    return BuiltMap(points, mesh.faces, float(np.hypot(error, np.sqrt(np.mean(distances * distances)))))
+
+
+def terrain_row(level: int, seed: int, folder: Path, kinds: Sequence[str] = KINDS[:2]) -> tuple[Scenario, Row]:
+    """Build the maps of one terrain with posts; the scenario, and how the built one compares with the truth."""
     scenario = generated(level).model_copy(update={"forests": (POSTS,), "limits": load_scenario("post_forest").limits})
     clear = coordinates((scenario.start, *scenario.goals))
     ground = scenario.world.heightfield(np.random.default_rng([seed, WORLD_STREAM]), clear)  # type: ignore[union-attr]
@@ -98,11 +156,19 @@ def terrain_row(level: int, seed: int, folder: Path) -> tuple[Scenario, Row]:
     rng = np.random.default_rng([seed, CLOUD_STREAM])
     parts = [scan_ground(ground, rng, GRASS_SHARE)]
     parts += [scan_post(post, float(ground.height_at(post.x, post.y)), rng) for post in posts]
-    surface = build_surface(np.vstack(parts))
+    points = np.vstack(parts)
+    surface = build_surface(points)
     truth = heightfield_mesh(ground.heights, ground.dx, ground.dy, ground.x0, ground.y0)
     centres = truth[0][truth[1]].mean(axis=1)[:, :2]
     near = np.linalg.norm(centres[:, None] - places[None], axis=2).min(axis=1) < 0.3
-    maps = write_maps(folder, f"level_{level}_{seed}", surface, (truth[0], truth[1][~near]))
+    built = built_map(points, surface)
+    meshes = {"true": BuiltMap(truth[0], truth[1][~near], 0.0), "built": built}
+    if "posed" in kinds:
+        scans = misplaced(points, rng)
+        meshes["posed"] = built_map(scans, build_surface(scans))
+    if "coarse" in kinds:
+        meshes["coarse"] = coarser(built, rng)
+    maps = write_maps(folder, f"level_{level}_{seed}", {kind: meshes[kind] for kind in kinds})
     row = {"world": scenario.name, "seed": seed, "maps": maps, **accuracy(surface, ground, rng)}
     on_map = MeshMap.from_arrays(surface.vertices, surface.faces).locator
     above = np.column_stack([places, np.full(len(places), 100.0)])
@@ -147,20 +213,26 @@ def building_row(number: int, folder: Path) -> tuple[Scenario, Row]:
         scenario = scenario.model_copy(update={"world": GarageWorld(type="garage", floors=2 + number // 2)})
     world = scenario.world.levels()  # type: ignore[union-attr]
     rng = np.random.default_rng([seed, CLOUD_STREAM])
-    surface = build_surface(np.vstack([scan_surface(world.ground, rng), scan_surface(world.walls, rng)]))
-    maps = write_maps(folder, f"{scenario.name}_{number}", surface, None)
-    return scenario, {"world": scenario.name, "seed": seed, "maps": maps, "route": True}
+    points = np.vstack([scan_surface(world.ground, rng), scan_surface(world.walls, rng)])
+    built = built_map(points, build_surface(points))
+    maps = write_maps(folder, f"{scenario.name}_{number}", {"built": built})
+    # The world writes the true map itself, so no setting names a file.
+    return scenario, {"world": scenario.name, "seed": seed, "maps": {"true": "", **maps}, "route": True}
 
 
-def write_maps(folder: Path, name: str, built: BuiltSurface, truth: Any) -> dict[str, str]:
-    """Write the built map and the true one; settings name no file where the world writes the true one itself."""
-    header = MapHeader((0.0, 0.0, 0.0), 0.0, 0.0)
-    files = {"built": folder / f"{name}_built.ply"}
-    write_map(files["built"], built.vertices, built.faces, header)
-    if truth is not None:
-        files["true"] = folder / f"{name}_true.ply"
-        write_map(files["true"], *truth, header)
-    return {"true": "", **{key: str(file) for key, file in files.items()}}
+def built_map(points: FloatArray, surface: BuiltSurface) -> BuiltMap:
+    """The map of a surface, with the error that ``mbf map build`` writes."""
+    return BuiltMap(surface.vertices, surface.faces, map_facts(PointCloud(points), surface).height_error)
+
+
+def write_maps(folder: Path, name: str, maps: Mapping[str, BuiltMap]) -> dict[str, str]:
+    """Write maps by their kinds; their files."""
+    files = {}
+    for kind, built in maps.items():
+        files[kind] = str(folder / f"{name}_{kind}.ply")
+        header = MapHeader((0.0, 0.0, 0.0), 0.0, 0.0, built.height_error)
+        write_map(Path(files[kind]), built.vertices, built.faces, header)
+    return files
 
 
 def drive(chosen: list[tuple[Scenario, Row]], workers: int) -> list[Row]:
@@ -184,7 +256,7 @@ def drive(chosen: list[tuple[Scenario, Row]], workers: int) -> list[Row]:
 def summarise(rows: list[Row]) -> Row:
     """Arrival on both maps where there is a route, and the accuracy of the built ones."""
     figures: Row = {}
-    for kind in ("built", "true"):
+    for kind in dict.fromkeys(row["map"] for row in rows):
         routed = [row for row in rows if row["map"] == kind and row["route"]]
         arrived = sum(bool(row["arrived"]) for row in routed)
         tipped = sum("tipped_over" in row["incidents"] for row in routed)
@@ -224,6 +296,9 @@ def main() -> None:
     parser.add_argument("--terrains", type=int, default=40)
     parser.add_argument("--buildings", type=int, default=10)
     parser.add_argument("--sizes", default="1,10", help="millions of points, comma separated; empty = none")
+    parser.add_argument("--levels", default=",".join(map(str, range(LEVELS))), help="of the terrains")
+    parser.add_argument("--seed", type=int, default=FIRST_SEED, help="of the first terrain of each level")
+    parser.add_argument("--maps", default="true,built", help=f"of the terrains, some of {', '.join(KINDS)}")
     parser.add_argument("--one-size", type=float, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one_size:
@@ -232,6 +307,7 @@ def main() -> None:
     terrains, buildings, sizes = arguments.terrains, arguments.buildings, arguments.sizes
     if arguments.quick:
         terrains, buildings, sizes = 4, 1, "1"
+    levels, kinds = [int(level) for level in arguments.levels.split(",")], arguments.maps.split(",")
     figures: Row = {"sizes": []}
     for size in filter(None, sizes.split(",")):
         command = [sys.executable, __file__, "--one-size", size]
@@ -239,7 +315,10 @@ def main() -> None:
         figures["sizes"].append(json.loads(answer.splitlines()[-1]))
         print(figures["sizes"][-1], flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        chosen = [terrain_row(n % LEVELS, FIRST_SEED + n // LEVELS, Path(folder)) for n in range(terrains)]
+        chosen = [
+            terrain_row(levels[n % len(levels)], arguments.seed + n // len(levels), Path(folder), kinds)
+            for n in range(terrains)
+        ]
         figures["terrains"] = summarise(drive(chosen, arguments.workers))
         figures["buildings"] = summarise(
             drive([building_row(n, Path(folder)) for n in range(buildings)], arguments.workers)

@@ -70,7 +70,12 @@ def build_map(
     surface = build_surface(cloud.points, parameters, on_step)
     facts = map_facts(cloud, surface)
     on_step(f"writing {out.name}")
-    write_map(out, surface.vertices, surface.faces, MapHeader(cloud.origin, facts.error_rms, facts.error_95))
+    write_map(
+        out,
+        surface.vertices,
+        surface.faces,
+        MapHeader(cloud.origin, facts.error_rms, facts.error_95, facts.height_error),
+    )
     return facts, surface, cloud
 
 

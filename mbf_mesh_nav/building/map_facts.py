@@ -35,6 +35,9 @@ class MapFacts:
         Of filled holes; of what something stands on; of separate surfaces that were left out.
     error_rms, error_95, error_max : float
         Of the surface against its points, the noise of the points included; 95 % are closer than ``error_95``.
+    height_error : float
+        Standard error of a vertex, whose height is the mean of the points of a cell: their error over the square root
+        of their number.
     """
 
     points: int
@@ -55,6 +58,7 @@ class MapFacts:
     error_rms: float
     error_95: float
     error_max: float
+    height_error: float
 
 
 def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
@@ -64,6 +68,8 @@ def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
     distances = np.abs(surface.distances[np.isfinite(surface.distances)].astype(np.float64))
     on_surface = used & ~patches.is_filled
     counts = (patches.ends - patches.firsts)[on_surface]
+    rms = float(np.sqrt((distances * distances).mean())) if len(distances) else 0.0
+    points_of_cell = float(np.median(counts)) if len(counts) else 0.0
     _, levels = np.unique(patches.cells[used], return_counts=True)
     x, y, z = np.ptp(cloud.points, axis=0).tolist()
     return MapFacts(
@@ -74,7 +80,7 @@ def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
         origin=cloud.origin,
         size=(x, y, z),
         cell=patches.grid.cell,
-        density=float(np.median(counts)) / square if len(counts) else 0.0,
+        density=points_of_cell / square,
         vertices=len(surface.vertices),
         faces=len(surface.faces),
         area=square * int(used.sum()),
@@ -82,9 +88,10 @@ def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
         filled_area=square * int((patches.is_filled & used).sum()),
         obstacle_area=square * int(surface.is_obstacle.sum()),
         small_area=square * int(surface.is_small.sum()),
-        error_rms=float(np.sqrt((distances * distances).mean())) if len(distances) else 0.0,
+        error_rms=rms,
         error_95=float(np.percentile(distances, 95.0)) if len(distances) else 0.0,
         error_max=float(distances.max(initial=0.0)),
+        height_error=rms / max(points_of_cell, 1.0) ** 0.5,
     )
 
 
@@ -103,5 +110,6 @@ def lines_of(facts: MapFacts) -> list[tuple[str, str]]:
         ("obstacles", f"{facts.obstacle_area:.1f} m2"),
         ("left out", thrown),
         ("error", f"{facts.error_rms:.4f} m rms of the points, 95 % below {facts.error_95:.4f} m"),
+        ("heights", f"{facts.height_error:.4f} m standard error, by which layers narrow their limits"),
         ("origin", f"({origin}) of the files is (0, 0, 0) of the map"),
     ]

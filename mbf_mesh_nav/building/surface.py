@@ -18,19 +18,23 @@ from mbf_mesh_nav.building.outliers import isolated_points
 from mbf_mesh_nav.building.surface_patches import Grid, SurfacePatches
 from mbf_mesh_nav.kernels.building.columns import first_heights, sort_into_cells, split_columns
 from mbf_mesh_nav.kernels.building.patches import settle_patches, slopes_of_patches
-from mbf_mesh_nav.kernels.building.quads import distances_to_faces, faces_of_patches
+from mbf_mesh_nav.kernels.building.quads import distances_to_faces, faces_of_patches, fitted_heights
 from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges, unit_face_normals
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.mesh.topology import faces_of_vertices
 
-POINTS_PER_CELL = 6.0
+POINTS_PER_CELL = 4.0
 SMALLEST_CELL, LARGEST_CELL, CELL_STEP = 0.05, 1.0, 0.05
 STOREY = 2.5
 SETTLINGS = 2
 """Times that slopes and heights are computed from each other."""
+FITTINGS, IMPROBABLE = 2, 2.0
+"""Times that heights are moved towards their points, and the standard errors from which a difference is no chance."""
 LEAST_POINTS = 100
 CROWN_UPWARD = 0.7071
 """Mean z of the unit normals below which a surface above ground is a crown."""
+MEDIAN_OF_ERRORS = 0.6745
+"""Median of the absolute values of normally distributed errors, in standard errors."""
 Step = Callable[[str], None]
 
 
@@ -38,7 +42,7 @@ class SurfaceParameters(ParameterModel):
     """How points become a surface; the defaults suit a robot of a metre's size outdoors."""
 
     cell: float = parameter(
-        0.0, "Distance between the vertices; 0 = from the density, about six points a cell.", unit="m", ge=0.0, le=10.0
+        0.0, "Distance between the vertices; 0 = from the density, about four points a cell.", unit="m", ge=0.0, le=10.0
     )
     outlier_points: int = parameter(
         4, "Points with fewer points around them are errors; 1 = keep all. Around is up to twice the cell.", ge=1
@@ -125,7 +129,7 @@ def build_surface(
     grid = Grid.around(kept, cell)
     rise = cell * float(tan(np.radians(chosen.max_slope))) + chosen.ground_thickness
     patches, kept = _split(kept, grid, chosen, rise)
-    patches = _settled(patches, kept, chosen, rise)
+    patches = _fitted(_settled(patches, kept, chosen, rise), kept, chosen, rise)
     on_step("holes")
     patches = without_holes(patches, chosen.hole_width, rise, chosen.clearance)
     on_step("faces")
@@ -191,6 +195,19 @@ def _settled(patches: SurfacePatches, points: FloatArray, chosen: SurfaceParamet
         arrays = (patches.firsts, patches.ends, patches.kinds, patches.centres, patches.heights)
         heights, standing = settle_patches(points, *arrays, slopes, limits)
         patches = replace(patches, heights=heights, standing=standing)
+    return patches
+
+
+def _fitted(patches: SurfacePatches, points: FloatArray, chosen: SurfaceParameters, rise: float) -> SurfacePatches:
+    """Copy whose faces are as near to the ground points as these are exact; see ``fitted_heights``."""
+    everywhere = np.ones(len(patches.cells), dtype=np.bool_)
+    for _ in range(FITTINGS):
+        links = patches.links(rise)
+        arrays = (points, patches.firsts, patches.ends, patches.centres, patches.heights, links)
+        distances = distances_to_faces(*arrays, everywhere, patches.grid.cell, chosen.ground_thickness)
+        error = float(np.nanmedian(np.abs(distances))) / MEDIAN_OF_ERRORS if np.isfinite(distances).any() else 0.0
+        limits = np.array([chosen.ground_thickness, IMPROBABLE * error])
+        patches = replace(patches, heights=fitted_heights(*arrays, patches.grid.cell, limits))
     return patches
 
 

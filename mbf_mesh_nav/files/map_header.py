@@ -1,4 +1,4 @@
-"""What a built map keeps beside its triangles, in comments of its PLY header: its origin and its error."""
+"""What a built map keeps beside its triangles, in comments of its PLY header: origin, errors, coordinate system."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 MAX_HEADER_BYTES = 2**16
 ORIGIN, ERROR = b"comment mbf_origin", b"comment mbf_error"
+HEIGHT_ERROR, CRS = b"comment mbf_height_error", b"comment mbf_crs"
 
 
 class MapHeader(NamedTuple):
@@ -19,17 +20,25 @@ class MapHeader(NamedTuple):
         Where the map's (0, 0, 0) lies in the coordinates of its survey.
     error_rms, error_95 : float
         Distance of the surveyed points from the surface: root mean square, and what 95 % of them keep.
+    height_error : float
+        Standard error of the heights of the vertices, by which layers narrow their limits; 0 = unknown.
+    crs : str
+        Coordinate system of the survey, such as "EPSG:25832"; "" = unknown.
     """
 
     origin: tuple[float, float, float]
     error_rms: float
     error_95: float
+    height_error: float = 0.0
+    crs: str = ""
 
 
 def header_comments(header: MapHeader) -> list[str]:
     """Lines of a PLY header that hold the facts."""
     origin = " ".join(repr(value) for value in header.origin)
-    return [f"{ORIGIN.decode()} {origin}", f"{ERROR.decode()} {header.error_rms!r} {header.error_95!r}"]
+    lines = [f"{ORIGIN.decode()} {origin}", f"{ERROR.decode()} {header.error_rms!r} {header.error_95!r}"]
+    lines.append(f"{HEIGHT_ERROR.decode()} {header.height_error!r}")
+    return [*lines, f"{CRS.decode()} {header.crs}"] if header.crs else lines
 
 
 def read_map_header(path: Path) -> MapHeader | None:
@@ -41,9 +50,11 @@ def read_map_header(path: Path) -> MapHeader | None:
     try:
         x, y, z = _numbers(lines, ORIGIN)
         error_rms, error_95 = _numbers(lines, ERROR)
+        (height_error,) = _numbers(lines, HEIGHT_ERROR) or [0.0]
     except ValueError:
         return None
-    return MapHeader((x, y, z), error_rms, error_95)
+    crs = [line[len(CRS) :].decode("ascii", "replace").strip() for line in lines if line.startswith(CRS + b" ")]
+    return MapHeader((x, y, z), error_rms, error_95, height_error, crs[0] if crs else "")
 
 
 def _numbers(lines: list[bytes], key: bytes) -> list[float]:

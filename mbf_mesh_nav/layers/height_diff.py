@@ -4,7 +4,8 @@ When to use: steps, kerbs, walls and holes that are small against the slope of t
 because a smooth slope costs nothing here. When not: meshes whose edges are as long as the radius (nothing lies within
 it) and noisy scans with random normals.
 Rule of mesh_navigation: the neighbourhood is a cylinder about the vertex normal. It has no bound along the normal
-there, so next to a wall it can run over the whole mesh; ``height_limit`` bounds it.
+there, so next to a wall it can run over the whole mesh; ``height_limit`` bounds it. On a map whose heights have an
+error the threshold is lower, by the standard error of the difference of two heights.
 """
 
 from __future__ import annotations
@@ -21,13 +22,14 @@ from mbf_mesh_nav.kernels.layers.patches import (
     height_differences_by_patches,
     patch_borders,
 )
-from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.map.height_error import LEAST_LIMIT, HeightErrorParameters
+from mbf_mesh_nav.map.layer import CostArray, LethalArray, MeshLayer
 
 _DENSE = 16.0
 """Edges in a radius from which patches pay: of about 48 vertices, they are then small against the neighbourhood."""
 
 
-class HeightDiffParameters(LayerParameters):
+class HeightDiffParameters(HeightErrorParameters):
     """Parameters of ``height_diff``."""
 
     threshold: float = parameter(0.185, "Lethal above this height difference.", unit="m", gt=0.0)
@@ -50,9 +52,9 @@ class HeightDiffLayer(MeshLayer):
         return math.hypot(parameters.radius, parameters.height_limit)
 
     def compute(self) -> tuple[CostArray, LethalArray]:
-        """Cost = height difference [m], lethal above ``threshold``."""
-        costs = self._differences()
-        return costs, costs > self.parameters.threshold
+        """Cost = height difference [m], lethal above ``threshold`` less the error of a difference."""
+        costs, settings = self._differences(), self.parameters
+        return costs, costs > max(settings.threshold - settings.step_error, LEAST_LIMIT)
 
     def _differences(self) -> CostArray:
         """Height differences (V,) [m]; dense meshes by patches, which gives the same values."""

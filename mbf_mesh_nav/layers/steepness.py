@@ -3,17 +3,25 @@
 When to use: always, as the cheapest guard against walls and slopes the robot slides on. When not: where the heading
 decides (a robot that may climb 20 degrees but tips at 10 degrees sideways): use ``tilt``. A face that looks down
 counts as upside down (pi), so the mesh must be wound upwards.
-Rule of mesh_navigation: acos of the normal's z component.
+Rule of mesh_navigation: acos of the normal's z component. On a map whose heights have an error the threshold is lower,
+by the standard error of the normal: on a square grid of triangles with the spacing L, the mean of the six normals
+around a vertex is wrong by error / (sqrt(3) L), along x as along y.
 """
 
 from __future__ import annotations
 
+import math
+
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.kernels.mesh.slopes import inclinations
-from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.map.height_error import LEAST_LIMIT, HeightErrorParameters
+from mbf_mesh_nav.map.layer import CostArray, LethalArray, MeshLayer
+
+SPACING = 3.0 / (2.0 + math.sqrt(2.0))
+"""Spacing of a square grid of triangles, in mean lengths of its edges."""
 
 
-class SteepnessParameters(LayerParameters):
+class SteepnessParameters(HeightErrorParameters):
     """Parameters of ``steepness``."""
 
     threshold: float = parameter(0.3, "Lethal above this inclination.", unit="rad", gt=0.0, le=3.1416)
@@ -31,6 +39,12 @@ class SteepnessLayer(MeshLayer):
         return 0.0
 
     def compute(self) -> tuple[CostArray, LethalArray]:
-        """Cost = inclination [rad] from 0 to pi, lethal above ``threshold``."""
+        """Cost = inclination [rad] from 0 to pi, lethal above ``threshold`` less the error of the normals."""
         costs = inclinations(self.topology.vertex_normals)
-        return costs, costs > self.parameters.threshold
+        return costs, costs > max(self.parameters.threshold - self.normal_error, LEAST_LIMIT)
+
+    @property
+    def normal_error(self) -> float:
+        """Standard error of a normal in one direction [rad]."""
+        spacing = SPACING * self.topology.mean_edge_length
+        return math.atan((self.parameters.height_error or 0.0) / (math.sqrt(3.0) * spacing))

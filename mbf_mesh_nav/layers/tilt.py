@@ -10,7 +10,8 @@ Rule: the four wheels stand on the surface, the body takes their plane of least 
 ``rigid`` one stands on three of them, which on a skew ledge is some degrees steeper, and counts the worse stance. A
 heading is allowed if roll, pitch up and pitch down keep their limits, the slope in every direction stays
 ``tip_over_margin`` below the angle at which the centre of mass leaves the wheels, and no vertex inside the footprint
-comes higher than the belly. Wheel positions are taken in the plan view.
+comes higher than the belly. Wheel positions are taken in the plan view. On a map whose heights have an error, each
+limit is lower by what the slope between two wheels may be wrong, and the belly has as much less room.
 Cost: about 10 microseconds a vertex, 144 bytes a vertex.
 """
 
@@ -24,12 +25,13 @@ from pydantic import model_validator
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import BoolArray, Float32Array
 from mbf_mesh_nav.kernels.layers.footprint_settling import settle_footprints, wheel_directions
-from mbf_mesh_nav.map.layer import CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.map.height_error import LEAST_LIMIT, HeightErrorParameters
+from mbf_mesh_nav.map.layer import CostArray, LayerContext, LethalArray, MeshLayer
 
 HEADINGS = 16
 
 
-class TiltParameters(LayerParameters):
+class TiltParameters(HeightErrorParameters):
     """Parameters of ``tilt``."""
 
     wheelbase: float = parameter(0.5, "Distance of the front from the rear wheels.", unit="m", gt=0.0, le=10.0)
@@ -55,6 +57,11 @@ class TiltParameters(LayerParameters):
         ge=0.0,
         le=1.0,
     )
+
+    @property
+    def room_below(self) -> float:
+        """The ground clearance less the error of the map [m]."""
+        return self.ground_clearance - self.step_error
 
     @model_validator(mode="after")
     def _stands_on_its_wheels(self) -> TiltParameters:
@@ -95,7 +102,7 @@ class TiltLayer(MeshLayer):
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = share of the limits that the best headings use, as many as preferred; 1 where too few are allowed.
 
-        Lethal where fewer are allowed than needed.
+        Lethal where fewer are allowed than needed. The error of the map narrows what is allowed, not the preference.
         """
         settings = self.parameters
         self.roll, self.pitch, bump = settle_footprints(
@@ -105,22 +112,33 @@ class TiltLayer(MeshLayer):
             settings.track,
             settings.rigid,
         )
-        usage = self._usage()
-        self.allowed = (usage <= 1.0) & (bump < settings.ground_clearance)
+        self.allowed = (self._usage(self.limits()) <= 1.0) & (bump < settings.room_below)
         needed = _count_of(settings.needed_headings)
         last = max(needed, _count_of(settings.preferred_headings)) - 1
-        ranked = np.partition(np.where(self.allowed, usage, np.inf), last, axis=1)[:, last]
+        usage = self._usage(self.limits_as_measured())
+        as_measured = (usage <= 1.0) & (bump < settings.ground_clearance)
+        ranked = np.partition(np.where(as_measured, usage, np.inf), last, axis=1)[:, last]
         lethal = np.count_nonzero(self.allowed, axis=1) < needed
         return np.where(np.isinf(ranked), 1.0, ranked).astype(np.float32), lethal
 
-    def _usage(self) -> Float32Array:
+    def _usage(self, limits: tuple[float, float, float]) -> Float32Array:
         """Greatest ratio (V, 16) of an angle to its limit."""
-        roll_limit, up_limit, down_limit = self.limits()
+        roll_limit, up_limit, down_limit = limits
         sideways = np.abs(self.roll) / roll_limit
         return np.asarray(np.maximum(sideways, np.maximum(self.pitch / up_limit, -self.pitch / down_limit)))
 
     def limits(self) -> tuple[float, float, float]:
-        """Return the limits of roll, pitch up and pitch down [rad], the tip-over margin included; at least 1e-3."""
+        """Return the limits of roll, pitch up and pitch down [rad] less the error of the map, at least 1e-3."""
+        settings = self.parameters
+        lengths = (settings.track, settings.wheelbase, settings.wheelbase)
+        roll, up, down = (
+            max(limit - settings.slope_error(length), LEAST_LIMIT)
+            for limit, length in zip(self.limits_as_measured(), lengths, strict=True)
+        )
+        return roll, up, down
+
+    def limits_as_measured(self) -> tuple[float, float, float]:
+        """Return the limits of roll, pitch up and pitch down [rad] on an exact map, the tip-over margin included."""
         settings = self.parameters
         height = settings.center_of_mass_height
         lever_arms = (
@@ -130,7 +148,7 @@ class TiltLayer(MeshLayer):
         )
         configured = (settings.max_roll, settings.max_pitch_up, settings.max_pitch_down)
         steady = [math.atan2(lever_arm, height) - settings.tip_over_margin for lever_arm in lever_arms]
-        roll, up, down = (max(min(pair), 1e-3) for pair in zip(configured, steady, strict=True))
+        roll, up, down = (max(min(pair), LEAST_LIMIT) for pair in zip(configured, steady, strict=True))
         return roll, up, down
 
 

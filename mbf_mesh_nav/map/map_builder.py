@@ -20,6 +20,7 @@ Everything that is wrong with the layers is reported at once, before the mesh is
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, cast
 
@@ -36,7 +37,9 @@ from mbf_abstract.maps.layers.layer_list import (
     plan_layers,
 )
 from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_mesh_nav.files.map_header import read_map_header
 from mbf_mesh_nav.files.mesh_io import MAX_FACES, SPLIT_CORNERS, read_mesh
+from mbf_mesh_nav.map.height_error import with_height_error
 from mbf_mesh_nav.map.layer import LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_cache import LayerCache
 from mbf_mesh_nav.map.layer_graph import LayerGraph
@@ -199,12 +202,19 @@ def build_mesh_map(
     mesh_map = MeshMap(build_topology(mesh), frame_id, report, parameters.inscribed_radius)
     mesh_map.max_turning_slope = parameters.max_turning_slope
     if plan:
+        plan = [replace(one, parameters=with_height_error(one.parameters, height_error_of(file))) for one in plan]
         graph = compute_layers(mesh_map, plan, parameters.cache_dir)
         default = parameters.default_layer or parameters.layers[-1].name
         mesh_map.set_layers(graph, default, parameters.edge_cost_factor)
     report.findings += frame_findings(file, parameters.up_axis, parameters.unit)
     report.findings += [*header_findings(file), *map_findings(mesh_map)]
     return mesh_map
+
+
+def height_error_of(file: str) -> float:
+    """Standard error [m] that a map file states of its heights; 0 for every other one, and for "" (arrays)."""
+    header = read_map_header(Path(file)) if file else None
+    return 0.0 if header is None else header.height_error
 
 
 LayerLoader = Callable[[str], type[MeshLayer]]

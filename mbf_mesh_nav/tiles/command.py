@@ -30,7 +30,8 @@ def tile(
     with readable_errors():
         from mbf_abstract.commands.standing_server import read_config_text
         from mbf_abstract.server.factory import read_config
-        from mbf_mesh_nav.map.map_builder import MeshMapParameters
+        from mbf_mesh_nav.map.height_error import with_height_error
+        from mbf_mesh_nav.map.map_builder import MeshMapParameters, height_error_of
         from mbf_mesh_nav.server import BARE_MESH
         from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
         from mbf_mesh_nav.tiles.source_files import open_source
@@ -40,9 +41,10 @@ def tile(
             raise typer.BadParameter(f"expected a configuration with a mesh_map, got {config}", param_hint="--config")
         section = checked.sections["mesh_map"]
         parameters = cast(MeshMapParameters, section.parameters)
+        error = height_error_of(str(source))
         settings = TileSettings(
             mesh_map=parameters,
-            layer_blocks={layer.name: layer.parameters for layer in section.layers},
+            layer_blocks={layer.name: with_height_error(layer.parameters, error) for layer in section.layers},
             tile_size=tile_size,
             portal_length=portal_length,
             frame_id=checked.parameters.global_frame,

@@ -1,4 +1,4 @@
-"""Faces between linked surface patches, and how far points lie from them."""
+"""Faces between linked surface patches, how far points lie from them, and heights that fit the points better."""
 
 from __future__ import annotations
 
@@ -78,21 +78,75 @@ def distances_to_faces(
                 patch, EAST if x >= 0.0 else WEST, NORTH if y >= 0.0 else SOUTH, links, is_used
             )
             if first >= 0:
-                distance = points[position, 2] - _height_in_quad(abs(x), abs(y), patch, first, across, last, heights)
+                a, b, c, d = weights_in_quad(abs(x), abs(y), splits_at(patch, first, across, last, heights))
+                height = a * heights[patch] + b * heights[first] + c * heights[across] + d * heights[last]
+                distance = points[position, 2] - height
                 if abs(distance) <= within:
                     distances[position] = distance
     return distances
 
 
 @inner_kernel
-def _height_in_quad(x: float, y: float, start: int, first: int, across: int, last: int, heights: FloatArray) -> float:
-    """Height of the faces of a quad at (x, y) in 0..1 from its start, along x to ``first`` and along y to ``last``."""
-    a, b, c, d = heights[start], heights[first], heights[across], heights[last]
-    height: float
-    if abs(c - a) < abs(d - b):  # as in splits_at
-        height = a + x * (b - a) + y * (c - b) if x >= y else a + y * (d - a) + x * (c - d)
-    elif x + y <= 1.0:
-        height = a + x * (b - a) + y * (d - a)
-    else:
-        height = c + (1.0 - x) * (d - c) + (1.0 - y) * (b - c)
-    return height
+def weights_in_quad(x: float, y: float, is_split_from_start: bool) -> tuple[float, float, float, float]:
+    """Weights of the four corners in the height of the faces of a quad, at (x, y) in 0..1 from its start.
+
+    The corners are the start, the one along x, the one across, and the one along y.
+    """
+    if is_split_from_start:
+        return (1.0 - x, x - y, y, 0.0) if x >= y else (1.0 - y, 0.0, x, y - x)
+    return (1.0 - x - y, x, 0.0, y) if x + y <= 1.0 else (0.0, 1.0 - y, x + y - 1.0, 1.0 - x)
+
+
+@kernel
+def fitted_heights(
+    points: FloatArray,
+    firsts: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    centres: FloatArray,
+    heights: FloatArray,
+    links: IntArray,
+    cell: float,
+    limits: FloatArray,
+) -> FloatArray:
+    """Heights (P,) moved towards the points around them, where these contradict the faces by more than chance.
+
+    The mean of a cell cuts crests off and fills hollows. What points are above or below the faces is shared among the
+    corners of the face by their weights. A corner moves by the weighted mean of it if its sum is improbable for
+    independent errors of the points.
+
+    Parameters
+    ----------
+    links : (P, 8) int32
+        As in ``kernels.building.patches``.
+    limits : (2,) float64
+        Points farther from the faces [m] are none of the surface; a weighted sum of errors is improbable above this
+        [m] times the root of the sum of the squared weights.
+    """
+    within, improbable = limits[0], limits[1]
+    count = heights.shape[0]
+    sums, weights, squares = np.zeros(count), np.zeros(count), np.zeros(count)
+    is_used = np.ones(count, dtype=np.bool_)
+    for patch in range(count):
+        for position in range(firsts[patch], ends[patch]):
+            x = (points[position, 0] - centres[patch, 0]) / cell
+            y = (points[position, 1] - centres[patch, 1]) / cell
+            first, across, last = quad_at(
+                patch, EAST if x >= 0.0 else WEST, NORTH if y >= 0.0 else SOUTH, links, is_used
+            )
+            if first < 0:
+                continue
+            a, b, c, d = weights_in_quad(abs(x), abs(y), splits_at(patch, first, across, last, heights))
+            height = a * heights[patch] + b * heights[first] + c * heights[across] + d * heights[last]
+            distance = points[position, 2] - height
+            if abs(distance) > within:
+                continue
+            for corner, weight in ((patch, a), (first, b), (across, c), (last, d)):
+                sums[corner] += weight * distance
+                weights[corner] += weight
+                squares[corner] += weight * weight
+    fitted = heights.copy()
+    for patch in range(count):
+        if abs(sums[patch]) > improbable * np.sqrt(squares[patch]):
+            # Half a point more in the denominator: a corner at the edge of all points does not move by one of them.
+            fitted[patch] += sums[patch] / (weights[patch] + 0.5)
+    return fitted

@@ -12,6 +12,7 @@ from mbf_mesh_nav.building.outliers import isolated_points
 from mbf_mesh_nav.building.surface import SurfaceParameters, build_surface, cell_for
 from mbf_mesh_nav.kernels.building.columns import LOWEST, SLAB, TOP, sort_into_cells, split_columns
 from mbf_mesh_nav.kernels.building.patches import STEP_X, STEP_Y, link_patches
+from mbf_mesh_nav.kernels.building.quads import fitted_heights
 from mbf_mesh_nav.map.map_builder import build_mesh_map, default_layers
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.mesh_report import MeshError
@@ -33,10 +34,10 @@ def parts_of(surface):
 def test_the_surface_is_nearer_to_the_ground_than_the_noise(rng):
     surface = build_surface(ground(rng, hills))
     errors = surface.vertices[:, 2] - hills(*surface.vertices[:, :2].T)
-    assert surface.patches.grid.cell == 0.25
+    assert surface.patches.grid.cell == 0.2
     assert np.sqrt((errors * errors).mean()) < 0.015
     assert abs(errors.mean()) < 0.002
-    assert len(surface.vertices) > 0.95 * 64 * 48
+    assert len(surface.vertices) > 0.95 * 80 * 60
 
 
 def test_the_distances_are_those_of_points_to_the_faces(rng):
@@ -92,9 +93,7 @@ def test_a_bridge_and_the_road_below_it_are_one_map_on_two_levels(rng):
 
 def test_storeys_do_not_make_the_cells_smaller(rng):
     floor = ground(rng, flat)
-    assert (
-        cell_for(floor) == cell_for(np.vstack([np.add(floor, (0.0, 0.0, 3.1 * level)) for level in range(4)])) == 0.25
-    )
+    assert cell_for(floor) == cell_for(np.vstack([np.add(floor, (0.0, 0.0, 3.1 * level)) for level in range(4)])) == 0.2
 
 
 def test_holes_are_filled_up_to_the_width_and_stay_where_they_are_wider(rng):
@@ -134,7 +133,7 @@ def test_a_car_roof_is_left_out_as_a_small_surface(rng):
     roof = rectangle(rng, (4.0, 8.0), (4.0, 5.8), (1.6, 1.6))
     surface = build_surface(np.vstack([ground(rng, flat), roof]))
     assert surface.vertices[:, 2].max() < 0.2
-    assert 5.0 < surface.is_small.sum() * 0.0625 < 9.0  # 4 x 1.8 m in whole cells
+    assert 5.0 < surface.is_small.sum() * 0.04 < 9.0  # 4 x 1.8 m in whole cells
 
 
 def test_points_below_the_ground_and_in_the_air_are_left_out(rng):
@@ -270,3 +269,65 @@ def test_isolated_points_are_those_with_few_points_in_the_voxels_around(seed, le
     voxels = [tuple(voxel) for voxel in np.floor(points - points.min(axis=0)).astype(int).tolist()]
     around = [sum(max(abs(a - b) for a, b in zip(one, other, strict=True)) <= 1 for other in voxels) for one in voxels]
     np.testing.assert_array_equal(isolated_points(points, 1.0, least), np.array(around) < least)
+
+
+def naive_fit(points, patch_of, centres, heights, columns, cell, within, improbable):
+    """``fitted_heights`` on a whole grid of cells, by planes through the three corners of the face below each point."""
+    gains = np.zeros((len(heights), 3))
+    for point, patch in zip(points, patch_of, strict=True):
+        step = np.where(point[:2] >= centres[patch], 1, -1)
+        row, column = divmod(int(patch), columns)
+        if not (0 <= column + step[0] < columns and 0 <= row + step[1] < len(heights) // columns):
+            continue
+        first, last = patch + step[0], patch + step[1] * columns
+        across = last + step[0]
+        x, y = np.abs(point[:2] - centres[patch]) / cell
+        if abs(heights[across] - heights[patch]) < abs(heights[last] - heights[first]):
+            corners = [patch, first, across] if x >= y else [patch, across, last]
+        else:
+            corners = [patch, first, last] if x + y <= 1.0 else [first, across, last]
+        weights = np.linalg.solve(np.vstack([centres[corners].T, np.ones(3)]), [*point[:2], 1.0])
+        distance = point[2] - weights @ heights[corners]
+        if abs(distance) <= within:
+            gains[corners] += np.column_stack([weights * distance, weights, weights**2])
+    is_moved = np.abs(gains[:, 0]) > improbable * np.sqrt(gains[:, 2])
+    return heights + np.where(is_moved, gains[:, 0] / (gains[:, 1] + 0.5), 0.0)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(0, 1000), st.floats(0.0, 0.1))
+def test_heights_move_towards_their_points_as_by_the_naive_twin(seed, improbable):
+    rng = np.random.default_rng(seed)
+    columns, rows, cell, each = 5, 4, 0.5, 3
+    column, row = np.arange(columns * rows) % columns, np.arange(columns * rows) // columns
+    centres = cell * (np.column_stack([column, row]) + 0.5)
+    heights = rng.normal(0.0, 0.1, columns * rows)
+    patch_of = np.repeat(np.arange(columns * rows), each)
+    xy = centres[patch_of] + rng.uniform(-0.5 * cell, 0.5 * cell, (len(patch_of), 2))
+    points = np.column_stack([xy, rng.normal(0.0, 0.15, len(patch_of))])
+    offsets = np.arange(columns * rows + 1, dtype=np.int32)
+    links = link_patches(offsets[:-1], heights, offsets, columns, 10.0)
+    firsts = each * np.arange(columns * rows)
+    limits = np.array([0.2, improbable])
+    fitted = fitted_heights(points, firsts, firsts + each, centres, heights, links, cell, limits)
+    expected = naive_fit(points, patch_of, centres, heights, columns, cell, *limits)
+    np.testing.assert_allclose(fitted, expected, rtol=0, atol=1e-9)
+
+
+def test_bumps_are_flattened_less_than_by_the_means_of_their_cells(rng, monkeypatch):
+    def bumps(x, y):
+        return 0.12 * np.cos(2.5 * np.pi * x) * np.cos(2.5 * np.pi * y)
+
+    points, places = ground(rng, bumps), rng.uniform(1.0, 11.0, (2000, 2))
+
+    def kept_share():
+        surface = build_surface(points)
+        locator = MeshMap.from_arrays(surface.vertices, surface.faces).locator
+        above = np.column_stack([places, np.full(len(places), 5.0)])
+        heights = 5.0 - locator.cast_rays(above, np.tile([0.0, 0.0, -1.0], (len(places), 1)))[1]
+        true = bumps(*places.T)
+        return (true * heights).sum() / (true * true).sum()
+
+    fitted = kept_share()
+    monkeypatch.setattr("mbf_mesh_nav.building.surface.FITTINGS", 0)
+    assert fitted > kept_share() + 0.05

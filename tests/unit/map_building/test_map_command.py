@@ -39,7 +39,7 @@ def test_a_map_is_built_from_tiles_and_a_plan_leads_around_the_tree(tmp_path, su
     assert done.exit_code == 0, done.output
     facts = json.loads(done.stdout)
     assert facts["origin"] == UTM.tolist()
-    assert facts["cell"] == 0.25
+    assert facts["cell"] == 0.2
     assert 185.0 < facts["area"] < 193.0
     assert facts["error_rms"] < 0.025
     planned = run("plan", out, "--start", 2, 6, "--goal", 14, 6, "--json")
@@ -53,7 +53,7 @@ def test_the_figures_are_printed(tmp_path, survey):
     done = run("map", "build", *survey, "--out", tmp_path / "map.ply")
     assert done.exit_code == 0, done.output
     names = [line.split()[0] for line in done.stdout.splitlines()]
-    assert names == ["points", "density", "surface", "mesh", "holes", "obstacles", "left", "error", "origin"]
+    assert names == ["points", "density", "surface", "mesh", "holes", "obstacles", "left", "error", "heights", "origin"]
     assert "taken as metres" in done.stdout
 
 
@@ -77,7 +77,7 @@ def test_the_same_files_give_the_same_bytes_in_any_order(tmp_path, survey):
 def test_the_map_file_keeps_origin_and_error(tmp_path, survey):
     facts, surface, _ = build_map(survey, tmp_path / "map.ply")
     header = read_map_header(tmp_path / "map.ply")
-    assert header == MapHeader(tuple(UTM.tolist()), facts.error_rms, facts.error_95)
+    assert header == MapHeader(tuple(UTM.tolist()), facts.error_rms, facts.error_95, facts.height_error)
     vertices, faces = read_mesh(tmp_path / "map.ply")
     np.testing.assert_array_equal(vertices, surface.vertices)
     np.testing.assert_array_equal(faces, surface.faces)

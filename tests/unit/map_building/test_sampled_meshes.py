@@ -24,7 +24,7 @@ def test_a_mesh_becomes_the_same_hill(tmp_path, name, vertices):
     cloud = read_clouds([exported(tmp_path / name, vertices)])
     surface = build_surface(cloud.points)
     expected = build_surface(read_clouds([exported(tmp_path / "expected.off")]).points)
-    assert surface.patches.grid.cell == 0.25
+    assert surface.patches.grid.cell == 0.2
     np.testing.assert_allclose(surface.vertices, expected.vertices, atol=0.03)
     assert "1536 faces sampled with 100 points/m2" in cloud.notes[0]
 
