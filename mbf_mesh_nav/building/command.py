@@ -38,6 +38,11 @@ def build(
     scale: float = typer.Option(
         0.0, "--scale", min=0.0, help="Length of the files' unit [m]; 0 = as they state, or 1."
     ),
+    crs: str = typer.Option(
+        "",
+        "--crs",
+        help="Coordinate system of the files, such as EPSG:25832; else as they state. Kept, not transformed.",
+    ),
     cell: float = typer.Option(0.0, "--cell", min=0.0, help="Distance of the vertices [m]; 0 = by the density."),
     clearance: float = typer.Option(1.5, "--clearance", help="Free height that the robot needs [m]."),
     step_height: float = typer.Option(0.2, "--step-height", help="What is driven over, such as grass [m]."),
@@ -70,6 +75,7 @@ def build(
                 parameters,
                 up_axis=up,
                 unit=scale,
+                crs=crs,
                 max_points=max_points,
                 drop_invalid=drop_invalid,
                 on_step=say,

@@ -31,6 +31,7 @@ def build_map(
     *,
     up_axis: str = "",
     unit: float = 0.0,
+    crs: str = "",
     max_points: int = MAX_POINTS,
     drop_invalid: bool = False,
     on_step: Callable[[str], None] = lambda text: None,
@@ -43,7 +44,7 @@ def build_map(
         Point clouds, or meshes to sample, all in one coordinate system; see ``clouds.point_cloud``.
     out : path
         A .ply file. It is replaced when the map is complete; until then, and if anything fails, it stays what it was.
-    up_axis, unit, max_points, drop_invalid
+    up_axis, unit, crs, max_points, drop_invalid
         As in ``read_clouds``.
     on_step : callable, optional
         Called with a text before each step. What it raises ends the building.
@@ -63,6 +64,7 @@ def build_map(
         files,
         up_axis=up_axis,
         unit=unit,
+        crs=crs,
         max_points=max_points,
         drop_invalid=drop_invalid,
         on_file=lambda file: on_step(f"reading {file.name}"),
@@ -74,7 +76,7 @@ def build_map(
         out,
         surface.vertices,
         surface.faces,
-        MapHeader(cloud.origin, facts.error_rms, facts.error_95, facts.height_error),
+        MapHeader(cloud.origin, facts.error_rms, facts.error_95, facts.height_error, facts.crs),
     )
     return facts, surface, cloud
 

@@ -22,6 +22,8 @@ class MapFacts:
         Length of the files' unit.
     origin : tuple of float
         Where the map's (0, 0, 0) lies in the coordinates of the files.
+    crs : str
+        Coordinate system of the files; "" = unknown.
     size : tuple of float
         Extents of the points along x, y and z.
     cell : float
@@ -45,6 +47,7 @@ class MapFacts:
     surface_points: int
     unit: float
     origin: tuple[float, float, float]
+    crs: str
     size: tuple[float, float, float]
     cell: float
     density: float
@@ -78,6 +81,7 @@ def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
         surface_points=len(distances),
         unit=cloud.unit,
         origin=cloud.origin,
+        crs=cloud.crs,
         size=(x, y, z),
         cell=patches.grid.cell,
         density=points_of_cell / square,
@@ -112,4 +116,5 @@ def lines_of(facts: MapFacts) -> list[tuple[str, str]]:
         ("error", f"{facts.error_rms:.4f} m rms of the points, 95 % below {facts.error_95:.4f} m"),
         ("heights", f"{facts.height_error:.4f} m standard error, by which layers narrow their limits"),
         ("origin", f"({origin}) of the files is (0, 0, 0) of the map"),
+        ("crs", facts.crs or "unknown"),
     ]

@@ -35,7 +35,8 @@ def header_findings(file: str) -> Iterator[Finding]:
     if header is not None:
         x, y, z = header.origin
         text = (
-            f"(0, 0, 0) of the map lies at ({x:.10g}, {y:.10g}, {z:.10g}) of its survey, "
+            f"(0, 0, 0) of the map lies at ({x:.10g}, {y:.10g}, {z:.10g}) of its survey "
+            f"({header.crs or 'coordinate system unknown'}), "
             f"whose points are {header.error_rms:.3f} m (rms) from the surface; standard error of its heights "
             f"{header.height_error:.3f} m"
         )

@@ -20,12 +20,17 @@ PACKAGES = {".las": ("laspy",), ".laz": ("laspy", "lazrs")}
 NOISE_CLASSES = (7, 18)
 CHUNK_POINTS = 1_000_000
 GEO_KEYS, WELL_KNOWN_TEXT = 34735, 2112
-MODEL_TYPE, LINEAR_UNIT, GEOGRAPHIC = 1024, 3076, 2
+MODEL_TYPE, PROJECTED_SYSTEM, LINEAR_UNIT, GEOGRAPHIC = 1024, 3072, 3076, 2
+USER_DEFINED = 32767
 UNITS = {9001: 1.0, 9002: 0.3048, 9003: 1200.0 / 3937.0}
 """Length [m] of the linear units of GeoTIFF keys: metre, foot, survey foot of the United States."""
 
 LENGTH_UNIT = re.compile(r'UNIT\["[^"]*(?:met|foot|feet|ft)[^"]*",\s*([0-9.eE+-]+)', re.IGNORECASE)
 """A linear unit of a coordinate system as well-known text, with its length [m]."""
+
+EPSG_CODE = re.compile(r'AUTHORITY\["EPSG",\s*"?(\d+)"?\]\s*\]\s*$')
+"""The code of a whole coordinate system, which stands at the end of its text."""
+SYSTEM_NAME = re.compile(r'^\s*\w+\["([^"]+)"')
 
 
 def read_las_points(path: Path, max_points: int) -> StoredPoints:
@@ -49,7 +54,8 @@ def read_las_points(path: Path, max_points: int) -> StoredPoints:
                 found = (path.stat().st_size - int(header.offset_to_point_data)) // size
                 if found < count:
                     raise MeshError(str(path), [f"the file is cut off: expected {count} points, found {found}"])
-            unit = _unit(path, header)
+            text, keys = _stated_system(header)
+            unit = _unit(path, text, keys)
             points, is_kept = _read_chunks(path, reader, count)
     except MeshError:
         raise
@@ -57,7 +63,7 @@ def read_las_points(path: Path, max_points: int) -> StoredPoints:
         raise MeshError(str(path), [f"cannot be read as LAS: {type(error).__name__}: {error}"]) from error
     dropped = count - int(is_kept.sum())
     notes = (f"{dropped} points are classified as noise or withheld",) if dropped else ()
-    return StoredPoints(points[is_kept] if dropped else points, notes=notes, unit=unit)
+    return StoredPoints(points[is_kept] if dropped else points, notes=notes, unit=unit, crs=_crs(text, keys))
 
 
 def _read_chunks(path: Path, reader: Any, count: int) -> tuple[Any, Any]:
@@ -77,11 +83,26 @@ def _read_chunks(path: Path, reader: Any, count: int) -> tuple[Any, Any]:
     return points, is_kept
 
 
-def _unit(path: Path, header: Any) -> float:
-    """Length [m] of the file's unit by its coordinate system, 0 if it states none."""
+def _stated_system(header: Any) -> tuple[str, dict[int, int]]:
+    """Coordinate system of a file as well-known text and as GeoTIFF keys; both may be empty."""
     records = {int(record.record_id): record for record in [*header.vlrs, *(header.evlrs or ())]}
     text = str(getattr(records.get(WELL_KNOWN_TEXT), "string", ""))
     keys = {int(key.id): int(key.value_offset) for key in getattr(records.get(GEO_KEYS), "geo_keys", ())}
+    return text, keys
+
+
+def _crs(text: str, keys: dict[int, int]) -> str:
+    """Code or name of the coordinate system, "" if the file states none."""
+    code = EPSG_CODE.search(text)
+    number = int(code.group(1)) if code else keys.get(PROJECTED_SYSTEM, 0)
+    if 0 < number != USER_DEFINED:
+        return f"EPSG:{number}"
+    name = SYSTEM_NAME.search(text)
+    return "" if name is None else " ".join(name.group(1).encode("ascii", "replace").decode().split())
+
+
+def _unit(path: Path, text: str, keys: dict[int, int]) -> float:
+    """Length [m] of the file's unit by its coordinate system, 0 if it states none."""
     if keys.get(MODEL_TYPE) == GEOGRAPHIC or text.startswith("GEOGCS"):
         raise MeshError(str(path), ["its coordinates are degrees; project them to metres first"])
     lengths = [float(length) for length in LENGTH_UNIT.findall(text)]

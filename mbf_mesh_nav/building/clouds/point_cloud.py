@@ -39,6 +39,7 @@ READERS: dict[str, Reader] = {
 """Readers by the ending of the file."""
 MAX_POINTS = 50_000_000
 """Points of all files together unless the caller asks for more; each takes some hundred bytes while a map is built."""
+LONGEST_CRS = 200
 FAR = 10_000.0
 """Coordinates [m] beyond this are of a grid of a country: the map gets an origin of its own."""
 ORIGIN_STEP = 100.0
@@ -64,12 +65,15 @@ class PointCloud:
         Length of the files' unit [m].
     notes : tuple of str
         What a user should know of the files.
+    crs : str
+        Coordinate system of the files; "" = unknown.
     """
 
     points: FloatArray
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     unit: float = 1.0
     notes: tuple[str, ...] = ()
+    crs: str = ""
 
 
 def read_clouds(
@@ -77,6 +81,7 @@ def read_clouds(
     *,
     up_axis: str = "",
     unit: float = 0.0,
+    crs: str = "",
     max_points: int = MAX_POINTS,
     drop_invalid: bool = False,
     on_file: Callable[[Path], None] = lambda file: None,
@@ -89,6 +94,8 @@ def read_clouds(
         Axis of the files that points up, "x", "y" or "z"; "" = z, for meshes as in ``files.file_frames``.
     unit : float
         Length of the files' unit [m]; 0 = as the files state, else 1.
+    crs : str
+        Coordinate system of all files, such as "EPSG:25832"; "" = as they state. Nothing is transformed.
     max_points : int
         Files of more points, together, are refused before their points are read.
     drop_invalid : bool
@@ -99,16 +106,23 @@ def read_clouds(
     Raises
     ------
     MeshError
-        A file cannot be read, holds points that are not finite, or coordinates that are no metres; or too few points.
+        A file cannot be read, holds points that are not finite, or coordinates that are no metres; or the files have
+        different units or coordinate systems.
     """
+    if len(crs) > LONGEST_CRS or not (crs.isascii() and crs.isprintable()):
+        text = f"crs: expected at most {LONGEST_CRS} characters of ASCII, such as EPSG:25832, got {crs!r:.60}"
+        raise MeshError("point cloud", [text])
     if not files:
         raise MeshError("point cloud", ["there is no input file"])
     parts, notes, stated = list[FloatArray](), list[str](), dict[Path, float]()
+    systems = dict[str, str]()
     for file in files:
         on_file(file)
         stored, is_on_map = _read(file, max_points - sum(map(len, parts)), up_axis, unit)
         points, dropped = _finite(file, stored.points, drop_invalid)
         stated[file] = unit or stored.unit
+        if stored.crs:
+            systems.setdefault(stored.crs, file.name)
         _refuse_lost_digits(file, points, stored.single_precision, stated[file] or 1.0)
         parts.append(points if is_on_map else on_the_map(points, FileFrame(up_axis or "z", stated[file] or 1.0)))
         notes += [f"{file.name}: {note}" for note in (*stored.notes, *dropped)]
@@ -117,13 +131,17 @@ def read_clouds(
             f"{file.name} {length:g} m" if length else f"{file.name} none" for file, length in stated.items()
         )
         raise MeshError("point cloud", [f"the files state different units ({text}); give one unit for all"])
+    if len(systems) > 1 and not crs:
+        text = ", ".join(f"{name} {system}" for system, name in systems.items())
+        hint = "Transform them to one, or give the right one with --crs"
+        raise MeshError("point cloud", [f"the files state different coordinate systems ({text})"], hint)
     _refuse_units(files, parts, is_stated=bool(stated[files[0]]))
     origin = _origin(parts)
     for part in parts:
         part -= origin
     cloud = parts[0] if len(parts) == 1 else np.concatenate(parts)
     x, y, z = origin.tolist()
-    return PointCloud(cloud, (x, y, z), stated[files[0]] or 1.0, tuple(notes))
+    return PointCloud(cloud, (x, y, z), stated[files[0]] or 1.0, tuple(notes), crs or next(iter(systems), ""))
 
 
 def _read(file: Path, max_points: int, up_axis: str, unit: float) -> tuple[StoredPoints, bool]:

@@ -26,12 +26,15 @@ class StoredPoints(NamedTuple):
         What a user should know, e.g. how many points were marked as noise.
     unit : float
         Length [m] of the file's unit if the file states it, else 0.
+    crs : str
+        Coordinate system that the file states, as "EPSG:25832" or by its name; "" = none.
     """
 
     points: FloatArray
     single_precision: bool = False
     notes: tuple[str, ...] = ()
     unit: float = 0.0
+    crs: str = ""
 
 
 def refuse_count(path: Path, count: int, max_points: int) -> None:

@@ -213,6 +213,35 @@ def test_files_of_different_units_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("text", "crs"),
+    [
+        ('PROJCS["a grid",UNIT["metre",1],AUTHORITY["EPSG","25832"]]', "EPSG:25832"),
+        ('PROJCS["a  grid of Ö",GEOGCS["b",AUTHORITY["EPSG","4258"]],UNIT["metre",1]]', "a grid of ?"),
+        ("", ""),
+    ],
+)
+def test_the_coordinate_system_is_the_one_that_the_file_states_or_that_is_given(tmp_path, text, crs):
+    file = write_las(tmp_path / "survey.las", POINTS, well_known_text=text)
+    assert read_clouds([file]).crs == crs
+    assert read_clouds([file], crs="EPSG:32632").crs == "EPSG:32632"
+
+
+def test_files_of_different_coordinate_systems_are_refused(tmp_path):
+    files = [
+        write_las(
+            tmp_path / f"{code}.las", POINTS, well_known_text=f'PROJCS["a",UNIT["metre",1],AUTHORITY["EPSG","{code}"]]'
+        )
+        for code in (25832, 25833)
+    ]
+    with pytest.raises(
+        MeshError, match=r"systems \(25832.las EPSG:25832, 25833.las EPSG:25833\). Transform them to one"
+    ):
+        read_clouds(files)
+    assert read_clouds(files, crs="EPSG:25832").crs == "EPSG:25832"
+    assert "crs: expected at most 200 characters of ASCII" in refusal(files[0], crs="two\nlines")
+
+
+@pytest.mark.parametrize(
     ("text", "reason"),
     [
         ('GEOGCS["a globe",UNIT["degree",0.0174532925]]', "its coordinates are degrees"),

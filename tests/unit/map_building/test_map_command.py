@@ -46,14 +46,28 @@ def test_a_map_is_built_from_tiles_and_a_plan_leads_around_the_tree(tmp_path, su
     assert planned.exit_code == 0, planned.output
     path = np.array(json.loads(planned.stdout)["poses"])
     assert np.hypot(path[:, 0] - 8.0, path[:, 1] - 6.0).min() > 0.45
-    assert "(0, 0, 0) of the map lies at (498700, 5432100, 0) of its survey" in planned.stdout
+    assert (
+        "(0, 0, 0) of the map lies at (498700, 5432100, 0) of its survey (coordinate system unknown)" in planned.stdout
+    )
 
 
 def test_the_figures_are_printed(tmp_path, survey):
     done = run("map", "build", *survey, "--out", tmp_path / "map.ply")
     assert done.exit_code == 0, done.output
     names = [line.split()[0] for line in done.stdout.splitlines()]
-    assert names == ["points", "density", "surface", "mesh", "holes", "obstacles", "left", "error", "heights", "origin"]
+    assert names == [
+        "points",
+        "density",
+        "surface",
+        "mesh",
+        "holes",
+        "obstacles",
+        "left",
+        "error",
+        "heights",
+        "origin",
+        "crs",
+    ]
     assert "taken as metres" in done.stdout
 
 
