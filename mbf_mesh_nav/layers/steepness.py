@@ -14,7 +14,7 @@ import math
 
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.kernels.mesh.slopes import inclinations
-from mbf_mesh_nav.map.height_error import LEAST_LIMIT, HeightErrorParameters
+from mbf_mesh_nav.map.height_error import HeightErrorParameters
 from mbf_mesh_nav.map.layer import CostArray, LethalArray, MeshLayer
 
 SPACING = 3.0 / (2.0 + math.sqrt(2.0))
@@ -41,7 +41,7 @@ class SteepnessLayer(MeshLayer):
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = inclination [rad] from 0 to pi, lethal above ``threshold`` less the error of the normals."""
         costs = inclinations(self.topology.vertex_normals)
-        return costs, costs > max(self.parameters.threshold - self.normal_error, LEAST_LIMIT)
+        return costs, costs > max(self.parameters.threshold - self.normal_error, 0.0)
 
     @property
     def normal_error(self) -> float:

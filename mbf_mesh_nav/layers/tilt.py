@@ -25,10 +25,12 @@ from pydantic import model_validator
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import BoolArray, Float32Array
 from mbf_mesh_nav.kernels.layers.footprint_settling import settle_footprints, wheel_directions
-from mbf_mesh_nav.map.height_error import LEAST_LIMIT, HeightErrorParameters
+from mbf_mesh_nav.map.height_error import HeightErrorParameters
 from mbf_mesh_nav.map.layer import CostArray, LayerContext, LethalArray, MeshLayer
 
 HEADINGS = 16
+LEAST_LIMIT = 1e-3
+"""Least limit [rad] that is left, however large margin and error are."""
 
 
 class TiltParameters(HeightErrorParameters):

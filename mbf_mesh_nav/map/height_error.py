@@ -14,8 +14,6 @@ from typing import TypeVar
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.map.layer import LayerParameters
 
-LEAST_LIMIT = 1e-3
-"""Least limit [m or rad] that is left, however large the error is."""
 Parameters = TypeVar("Parameters", bound=ParameterModel)
 
 
