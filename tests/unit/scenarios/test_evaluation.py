@@ -272,7 +272,7 @@ def test_marks_of_the_terminal_in_results_are_shown_as_they_are():
     assert all(text in console.file.getvalue() for text in ("a[/b]", "1 [/c]", "[/d]"))
 
 
-@pytest.mark.parametrize("protocol", [OUTDOOR, INDOOR, MOVING], ids=lambda protocol: protocol.title)
+@pytest.mark.parametrize("protocol", [OUTDOOR, INDOOR, MOVING, BLIND], ids=lambda protocol: protocol.title)
 def test_the_results_that_ship_are_of_this_version_and_name_how_they_were_made(protocol):
     results = shipped_results(protocol)
     hashes = {protocol.trial_hash(trial) for trial in protocol.trials}
