@@ -91,6 +91,7 @@ def ros2(
 
 
 def ros2_interfaces(
+    packages: list[str] = typer.Argument(None, metavar="[PACKAGE]...", help="Which of them; all if none is given."),
     into: Path = typer.Option(None, "--into", help="Folder for the packages; that of this Python if not given."),
 ) -> None:
     """Compile map_msgs, mbf_msgs, mesh_msgs, nav2_msgs and tf2_msgs, which the wheels of ROS 2 lack; needs gcc."""
@@ -98,7 +99,9 @@ def ros2_interfaces(
         from mbf_ros.ros2.interfaces.building import build
         from mbf_ros.ros2.interfaces.definitions import PACKAGES
 
-        for package in PACKAGES:
+        if unknown := sorted(set(packages or ()).difference(PACKAGES)):
+            raise ValueError(f"expected some of the packages {', '.join(PACKAGES)}, got {', '.join(unknown)}")
+        for package in packages or PACKAGES:
             with waiting(f"compiling {package}") as on_step:
                 target = build(package, into or Path(sysconfig.get_paths()["purelib"]), on_step)
             typer.echo(f"{package}: {target}")

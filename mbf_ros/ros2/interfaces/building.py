@@ -1,8 +1,12 @@
 """Compiles interface packages with the rosidl generators of the installed ROS 2.
 
-Only what rclpy needs is made: messages for Python, and the type support of Fast DDS, in one extension module. That
-takes less than half the time of the packages' usual build, and neither CMake nor ament, whose files in the wheels name
-folders of the machine that made them.
+Only what rclpy needs is made: messages for Python, and the type support of Fast DDS. That takes less than half the time
+of the packages' usual build, and neither CMake nor ament, whose files in the wheels name folders of the machine that
+made them.
+
+Up to Jazzy, Fast DDS also asks for descriptions of types (introspection). Where a package has two type supports,
+``rosidl_typesupport_c`` loads the library of the one that is asked for by its name. So each has a library of that name,
+which holds nothing and leads to the library of the package; the extension module loads all of them with itself.
 """
 
 from __future__ import annotations
@@ -22,9 +26,13 @@ from typing import Any
 from mbf_ros.ros2.interfaces.definitions import interface_files, used_packages
 
 FAST_DDS, CHOSEN = "rosidl_typesupport_fastrtps_c", "rosidl_typesupport_c"
-RUNTIME = ("rosidl_runtime_c", CHOSEN, FAST_DDS, "rosidl_typesupport_fastrtps_cpp", "fastcdr", "rcutils")
-OF_A_PACKAGE = ("rosidl_generator_c", "rosidl_generator_py", CHOSEN, FAST_DDS)
-"""Libraries of each package that others use."""
+INTROSPECTION = "rosidl_typesupport_introspection_c"
+FAST_DDS_2 = "libfastrtps.so"
+"""The library of Fast DDS in Humble to Jazzy; later ones have another name."""
+RUNTIME = ("rosidl_runtime_c", CHOSEN, FAST_DDS, INTROSPECTION, "rosidl_typesupport_fastrtps_cpp", "fastcdr", "rcutils")
+OF_A_PACKAGE = ("rosidl_generator_c", CHOSEN, FAST_DDS, INTROSPECTION)
+FOR_PYTHON = "rosidl_generator_py"
+"""Libraries of each package that others use; the one for Python only their extension modules."""
 INTERMEDIATE = ("*.c", "*.cpp", "*.h", "*.hpp", "*.o", "*.idl", "detail")
 
 
@@ -54,6 +62,11 @@ def build(package: str, into: Path, on_step: Callable[[str], None] = lambda text
     return into / package
 
 
+def _type_supports() -> list[str]:
+    """Names of the type supports that the installed Fast DDS asks for."""
+    return [FAST_DDS, INTROSPECTION] if (_prefix() / "lib" / FAST_DDS_2).exists() else [FAST_DDS]
+
+
 def _generate(package: str, made: Path) -> list[Path]:
     """Write Python, C and C++ of all interfaces of a package; returns what is to be compiled."""
     try:
@@ -62,17 +75,22 @@ def _generate(package: str, made: Path) -> list[Path]:
         from rosidl_generator_py.cli import GeneratePython
         from rosidl_typesupport_c.cli import GenerateCTypesupport
         from rosidl_typesupport_fastrtps_c.cli import GenerateFastRTPSCTypesupport
+        from rosidl_typesupport_introspection_c.cli import GenerateIntrospectionCTypesupport
     except ImportError as error:
         raise BuildError(f"the generators of ROS 2 are not installed ({error}); see docs/ros2.md") from error
 
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)  # of the wheels; else a setup file sets it
     translators = {"msg": TranslateMsgToIDL, "srv": TranslateSrvToIDL, "action": TranslateActionToIDL}
-    generators: list[Any] = [
-        GenerateC("c"),
-        GenerateFastRTPSCTypesupport(FAST_DDS),
-        GenerateCTypesupport(CHOSEN, typesupport_implementations=[FAST_DDS]),
-        GeneratePython("py", typesupport_implementations=[CHOSEN]),
+    supports = _type_supports()
+    described = made.parent / "introspection" / package  # apart, because some files are named as those of C
+    generators: list[tuple[Any, Path]] = [
+        (GenerateC("c"), made),
+        (GenerateFastRTPSCTypesupport(FAST_DDS), made),
+        (GenerateCTypesupport(CHOSEN, typesupport_implementations=supports), made),
+        (GeneratePython("py", typesupport_implementations=[CHOSEN]), made),
     ]
+    if INTROSPECTION in supports:
+        generators.append((GenerateIntrospectionCTypesupport(INTROSPECTION), described))
     shares = [str(_prefix() / "share" / used) for used in used_packages(package)]
     with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):  # each file is announced
         idl = []
@@ -82,10 +100,11 @@ def _generate(package: str, made: Path) -> list[Path]:
             file.write_text(text, "utf-8")
             kind = file.suffix[1:]
             idl += translators[kind](kind).translate(package, [f"{made}:{name}"], [], made)
-        for generator in generators:
-            generator.generate(package, idl, shares, made)
+        for generator, target in generators:
+            generator.generate(package, idl, shares, target)
     (made / "__init__.py").write_text("", "utf-8")
-    return sorted(file for file in made.rglob("*") if file.suffix in (".c", ".cpp"))
+    files = (file for folder in (made, described) for file in folder.rglob("*"))
+    return sorted(file for file in files if file.suffix in (".c", ".cpp"))
 
 
 def _prefix() -> Path:
@@ -96,13 +115,14 @@ def _prefix() -> Path:
 
 
 def _compile(package: str, made: Path, sources: list[Path]) -> None:
-    """Make the extension module of a package out of its sources."""
+    """Make the libraries and the extension module of a package out of its sources."""
     import numpy
 
     prefix = _prefix()
     headers = prefix / "include"
-    folders = [made.parent, headers, *sorted(headers.iterdir()), sysconfig.get_paths()["include"]]
-    flags = ["-O0", "-fPIC", "-w", *(f"-I{folder}" for folder in (*folders, numpy.get_include()))]
+    folders = [made.parent, made.parent / "introspection", headers, *sorted(headers.iterdir())]
+    folders += [Path(sysconfig.get_paths()["include"]), Path(numpy.get_include())]
+    flags = ["-O0", "-fPIC", "-w", *(f"-I{folder}" for folder in folders)]
 
     def compile_one(source: Path) -> str:
         compiler = ["gcc", "-std=c11"] if source.suffix == ".c" else ["g++", "-std=c++17"]
@@ -110,13 +130,29 @@ def _compile(package: str, made: Path, sources: list[Path]) -> None:
         _run([*compiler, *flags, "-c", str(source), "-o", target])
         return target
 
+    def link(name: str, objects: list[str], libraries: list[str]) -> None:
+        search = [f"-L{made}", f"-L{prefix / 'lib'}", f"-Wl,-rpath,$ORIGIN:{prefix / 'lib'}"]
+        names = ["-Wl,--no-as-needed", *(f"-l{library}" for library in libraries)]
+        _run(["g++", "-shared", "-o", str(made / name), f"-Wl,-soname,{name}", *objects, *search, *names])
+
+    def installed(libraries: list[str]) -> list[str]:
+        return [name for name in libraries if (prefix / "lib" / f"lib{name}.so").exists()]
+
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        objects = list(pool.map(compile_one, sources))
-    names = [f"{used}__{kind}" for used in used_packages(package) for kind in OF_A_PACKAGE]
-    libraries = [name for name in (*names, *RUNTIME) if (prefix / "lib" / f"lib{name}.so").exists()]
-    module = made / f"{package}_s__{CHOSEN}{sysconfig.get_config_var('EXT_SUFFIX')}"
-    search = [f"-L{prefix / 'lib'}", f"-Wl,-rpath,{prefix / 'lib'}"]
-    _run(["g++", "-shared", "-o", str(module), *objects, *search, *(f"-l{name}" for name in libraries)])
+        objects = dict(zip(sources, pool.map(compile_one, sources), strict=True))
+    of_python = [made_of for source, made_of in objects.items() if source.name.startswith("_")]
+    others = [made_of for source, made_of in objects.items() if not source.name.startswith("_")]
+    used = used_packages(package)
+    libraries = installed([*(f"{one}__{kind}" for one in used for kind in OF_A_PACKAGE), *RUNTIME])
+    ours = [f"{package}__{CHOSEN}"]
+    link(f"lib{ours[0]}.so", others, libraries)
+    if INTROSPECTION in _type_supports():
+        ours += [f"{package}__{support}" for support in _type_supports()]
+        for name in ours[1:]:
+            link(f"lib{name}.so", [], ours[:1])
+    for_python = installed([f"{one}__{FOR_PYTHON}" for one in used])
+    module = f"{package}_s__{CHOSEN}{sysconfig.get_config_var('EXT_SUFFIX')}"
+    link(module, of_python, [*ours, *for_python, *libraries])
 
 
 def _run(command: list[str]) -> None:

@@ -1,30 +1,17 @@
-"""Real nodes of ROS 2 in processes of their own; their environment is built once per machine and kept in a cache."""
+"""Real nodes of ROS 2 in processes of their own."""
 
-import fcntl
-import hashlib
 import json
-import os
-import platform
-import re
-import shutil
 import subprocess
-import sys
 import threading
 from contextlib import ExitStack
-from importlib.metadata import requires
 from pathlib import Path
 
 import pytest
 
-import mbf_ros.ros2.interfaces.building as building
-from mbf_ros.ros2.interfaces.definitions import PACKAGES, interface_files
+from tests.system.ros2.environments import JAZZY, KILTED, clean_variables, free_domain
 
-PYTHONS = ((3, 10), (3, 13))
-"""Oldest and newest Python for which there are wheels."""
-MBF = "from mbf_abstract.cli import main; main()"
 PEERS = Path(__file__).parent / "peers"
 WITHIN = 300.0  # s; nothing waits that long unless it fails
-DOMAINS = range(1, 101)  # domains of DDS whose ports are not those that Linux gives to other programs
 ROBOT = """
 backend: costmap
 controller_patience: 60.0
@@ -40,89 +27,15 @@ recovery_behaviors: [{name: pause, type: wait}]
 )
 
 
-def missing():
-    """Why there is no ROS 2 here; empty if there is."""
-    here = f"{platform.system()}, {platform.machine()}, Python {platform.python_version()}"
-    wanted = sys.platform == "linux" and platform.machine() == "x86_64"
-    if not wanted or not PYTHONS[0] <= sys.version_info[:2] <= PYTHONS[1]:
-        return f"wheels of ROS 2 are there for Linux on x86_64 and Python 3.10 to 3.13, this is {here}"
-    if shutil.which("g++") is None:
-        return "g++ is needed to compile message packages"
-    return ""
-
-
-def requirements():
-    """The extra ``ros2`` of this project, without its conditions."""
-    lines = requires("mbf-flex") or ()
-    return [line.partition(";")[0].strip() for line in lines if re.search(r"extra == .ros2.", line)]
-
-
-def key():
-    """What the environment depends on, as a short text."""
-    texts = [*requirements(), sys.version, Path(building.__file__).read_text("utf-8")]
-    texts += [f"{name}\n{text}" for package in PACKAGES for name, text in interface_files(package).items()]
-    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
-
-
-def clean_variables(folder, domain=0):
-    """Environment variables for a peer: nothing of the caller's but where its packages are, which the peer shares.
-
-    The wheels start each Python of their environment anew with other library paths, and children would inherit that.
-    """
-    kept = {name: os.environ[name] for name in ("PATH", "HOME", "NUMBA_CACHE_DIR") if name in os.environ}
-    paths = [str(Path(folder) / "interfaces"), *(path for path in sys.path if path)]
-    discovery = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    return {**kept, **discovery, "PYTHONPATH": os.pathsep.join(paths)}
-
-
-def prepared():
-    """Return the folder of the environment, built if it is not there: ``MBF_ROS_ENV``, or one in the user's cache."""
-    root = Path(os.environ.get("MBF_ROS_ENV") or Path.home() / ".cache" / "mbf-flex" / "ros2")
-    root.mkdir(parents=True, exist_ok=True)
-    folder = root / key()
-    with open(root / "lock", "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # the processes of pytest-xdist come here together
-        if not (folder / "complete").exists():
-            shutil.rmtree(folder, ignore_errors=True)
-            _build(folder)
-            (folder / "complete").touch()
-    return folder
-
-
-def _build(folder):
-    variables = clean_variables(folder)
-    venv, python = folder / "venv", str(folder / "venv" / "bin" / "python")
-    pip = [sys.executable, "-m", "pip", "--python", python, "--disable-pip-version-check"]
-    ours = {**os.environ, "PYTHONPATH": variables["PYTHONPATH"]}  # pip may find its index and proxy there
-    for command, environment in (
-        ([sys.executable, "-m", "venv", "--without-pip", str(venv)], ours),
-        ([*pip, "install", "--quiet", "--no-warn-conflicts", *requirements()], ours),
-        ([python, "-c", MBF, "ros2-interfaces", "--into", str(folder / "interfaces")], variables),
-    ):
-        subprocess.run(command, check=True, env=environment, timeout=900)
-
-
-def free_domain(root, closing):
-    """Return a domain that no other trio on this machine has, and keep it until ``closing`` ends."""
-    for domain in DOMAINS:
-        lock = closing.enter_context(open(root / f"domain-{domain}", "w"))
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            continue
-        return domain
-    raise RuntimeError(f"all domains of DDS, {DOMAINS}, are in use")
-
-
 class Peer:
     """A process that writes JSON, one value a line, and takes orders on its standard input; its log is in ``logs``."""
 
-    def __init__(self, folder, domain, logs, *command, **variables):
-        python = str(folder / "venv" / "bin" / "python")
+    def __init__(self, folder, domain, logs, *command, program=None, **variables):
+        program = program or str(folder / "venv" / "bin" / "python")
         self._log = open(logs / f"{Path(command[0]).stem}.txt", "a")
         self._over = False
         self.process = subprocess.Popen(
-            [python, *command],
+            [program, *command],
             env={**clean_variables(folder, domain), "ROS_LOG_DIR": str(logs), **variables},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -199,6 +112,10 @@ class Robot(Peer):
         """Wait until it was stopped; one that has never been moved gets no command to stop, either."""
         self.wait_until(lambda: [line["speed"] for line in self.lines if "speed" in line][-1:] in ([], [0.0]))
 
+    def wait_until_it_stands(self, since):
+        """Wait until it has stopped by itself, for want of commands; returns where."""
+        return self.wait_for(lambda line: line.get("stood"), since)["x"]
+
     def wait_for_speed(self, wanted, since=0):
         return self.wait_for(lambda line: "speed" in line and wanted(line["speed"]), since)
 
@@ -240,19 +157,30 @@ class Client(Peer):
         return line["status"], line["outcome"]
 
 
+def folder_of(distribution):
+    if reason := distribution.missing():
+        pytest.skip(reason)
+    return distribution.prepared()
+
+
 @pytest.fixture(scope="session")
 def ros_folder():
-    """Folder of the environment."""
-    if reason := missing():
-        pytest.skip(reason)
-    return prepared()
+    """Folder of the environment with Kilted."""
+    return folder_of(KILTED)
+
+
+@pytest.fixture(scope="session")
+def jazzy_folder():
+    """Folder of the environment with Jazzy, mbf_msgs and tf2_msgs, and a rosbridge server."""
+    return folder_of(JAZZY)
 
 
 class Trio:
     """A robot, our node and a client, in a domain of DDS of their own, where they hear no other test."""
 
-    def __init__(self, closing, folder, logs, module):
+    def __init__(self, closing, folder, logs, module, node_folder=None, client_folder=None):
         self._closing, self._folder, self._logs = closing, folder, logs
+        self._node_folder, self._client_folder = node_folder or folder, client_folder or folder
         self._domain = free_domain(folder.parent, closing)
         self._client = getattr(module, "CLIENT", "client.py")
         self._options = getattr(module, "OPTIONS", ())
@@ -271,10 +199,10 @@ class Trio:
 
     def start_node(self, *options):
         arguments = *self._options, *options, *self._node_arguments
-        self.node = self._start(Peer, str(PEERS / "node.py"), str(self.file), *arguments)
+        self.node = self._start(Peer, str(PEERS / "node.py"), str(self.file), *arguments, folder=self._node_folder)
 
     def start_client(self):
-        self.client = self._start(Client, self._client)
+        self.client = self._start(Client, self._client, folder=self._client_folder)
 
     def wait_until_ready(self, since=0):
         """Wait until the node says that it hears the robot, in a line after the first ``since``."""
@@ -293,21 +221,30 @@ class Trio:
         self.client.order({"order": "cancel", "key": goal})
         return self.client.wait(goal, "result")
 
-    def _start(self, kind, *arguments):
-        peer = kind(self._folder, self._domain, self._logs, *arguments)
+    def _start(self, kind, *arguments, folder=None):
+        peer = kind(folder or self._folder, self._domain, self._logs, *arguments)
         self._closing.callback(peer.end)
         return peer
 
 
+def pytest_generate_tests(metafunc):
+    """Where a module has ``PAIRS`` of distributions, of the node and of the client, its tests run for each of them."""
+    pairs = getattr(metafunc.module, "PAIRS", ())
+    if pairs and "module_trio" in metafunc.fixturenames:
+        metafunc.parametrize("module_trio", pairs, ids=" and ".join, indirect=True, scope="module")
+
+
 @pytest.fixture(scope="module")
 def module_trio(ros_folder, tmp_path_factory, request):
-    """One trio for all tests of a module.
+    """One trio for all tests of a module, on Kilted where it has no ``PAIRS``.
 
     On simulated time where the module has ``SIMULATED``; with the script of its ``CLIENT``, its ``CONFIG`` and its
     ``OPTIONS`` of the command, where it has them.
     """
+    names = getattr(request, "param", ("kilted", "kilted"))
+    folders = [request.getfixturevalue("jazzy_folder") if name == "jazzy" else ros_folder for name in names]
     with ExitStack() as closing:
-        yield Trio(closing, ros_folder, tmp_path_factory.mktemp("trio"), request.module)
+        yield Trio(closing, ros_folder, tmp_path_factory.mktemp("trio"), request.module, *folders)
 
 
 @pytest.fixture

@@ -7,9 +7,11 @@ import pytest
 
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
-from mbf_ros.ros2.interfaces.definitions import PACKAGES
+from tests.system.ros2.environments import JAZZY, KILTED
 
 pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+PAIRS = [("kilted", "kilted"), ("kilted", "jazzy"), ("jazzy", "kilted")]
+OPTIONS = ("--max-silence", "5")  # a machine that is busy keeps the robot silent for longer than is usual
 HASHES = Path(__file__).parents[2] / "unit" / "ros" / "type_hashes.txt"
 
 
@@ -40,12 +42,14 @@ WHOLE = {  # the released packages as ROS 2 compiles them
 }
 
 
-def test_the_compiled_types_have_the_hashes_of_the_released_packages(ros_folder):
+@pytest.mark.parametrize("distribution", [KILTED, JAZZY], ids=lambda one: one.name)
+def test_the_compiled_types_have_the_hashes_of_the_released_packages(distribution, request):
+    folder = request.getfixturevalue("ros_folder" if distribution is KILTED else "jazzy_folder")
     released = dict(line.split() for line in HASHES.read_text().splitlines() if not line.startswith("#"))
-    descriptions = [json.loads(file.read_text()) for file in (ros_folder / "interfaces").rglob("*.json")]
+    descriptions = [json.loads(file.read_text()) for file in (folder / "interfaces").rglob("*.json")]
     compiled = {one["type_name"]: one["hash_string"] for described in descriptions for one in described["type_hashes"]}
     whole = {name: f"RIHS01_{digits}" for name, digits in WHOLE.items()}
-    ours = {name: value for name, value in released.items() if name.startswith(PACKAGES)} | whole
+    ours = {name: value for name, value in (released | whole).items() if name.startswith(distribution.packages)}
     assert {name: compiled.get(name) for name in ours} == ours
 
 

@@ -10,7 +10,8 @@ from mbf_ros.bags.export import messages_of
 from mbf_ros.bags.reading import open_bag
 from mbf_ros.bags.writing import write_bag
 from mbf_ros.messages.interfaces import json_text
-from tests.system.ros2.conftest import PEERS, WITHIN, clean_variables
+from tests.system.ros2.conftest import PEERS, WITHIN
+from tests.system.ros2.environments import clean_variables
 from tests.unit.bags.test_export import make_log
 
 pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]

@@ -1,12 +1,48 @@
-"""What fails to come, fails or is killed: the robot is stopped, and the next goal works."""
+"""What fails to come, fails or is killed: the robot is stopped, and the next goal works. And what is left behind."""
 
 import signal
+from pathlib import Path
 
 import pytest
 
-from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
 
 pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+GOALS = 1000
+GROWTH = 10  # kB a goal: less than a goal with its result takes that is kept
+
+
+def held_by(process):
+    """Threads, open files and memory [kB] of a process."""
+    folder = Path(f"/proc/{process.pid}")
+    status = dict(line.split(":", 1) for line in (folder / "status").read_text().splitlines())
+    return int(status["Threads"]), len(list((folder / "fd").iterdir())), int(status["VmRSS"].split()[0])
+
+
+def plan(trio, number):
+    """Ask for a plan so many times; returns how often each outcome came."""
+    outcomes = trio.client.wait(trio.client.do(order="repeat", number=number), "repeated")["outcomes"]
+    return {int(outcome): count for outcome, count in outcomes.items()}
+
+
+def test_a_thousand_goals_leave_nothing_behind(trio):
+    assert plan(trio, 200) == {GetPathOutcome.SUCCESS: 200}  # rclpy keeps the results of the last 10 s
+    threads, files, memory = held_by(trio.node.process)
+    assert plan(trio, GOALS) == {GetPathOutcome.SUCCESS: GOALS}
+    later_threads, later_files, later_memory = held_by(trio.node.process)
+    assert later_threads <= threads + 2 and later_files <= files + 2  # a thread may just be ending
+    assert later_memory - memory < GROWTH * GOALS
+
+
+def test_the_robot_stops_when_the_node_is_killed_and_a_new_node_takes_the_next_goal(trio):
+    trio.drive()
+    before = len(trio.robot.lines)
+    trio.node.kill()
+    stood = trio.robot.wait_until_it_stands(before)
+    trio.start_node()
+    trio.wait_until_ready()
+    assert trio.client.result("move_base", target=[stood + 0.5, 0.0]) == ("succeeded", MoveBaseOutcome.SUCCESS)
+    assert abs(trio.robot.x - stood - 0.5) < 0.3
 
 
 def test_a_goal_ends_with_tf_error_when_the_robot_is_killed_and_the_next_one_works(trio):

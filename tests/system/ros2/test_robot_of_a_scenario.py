@@ -7,7 +7,8 @@ import pytest
 
 import terrain.scenarios.scenario
 from mbf_abstract.outcomes import MoveBaseOutcome
-from tests.system.ros2.conftest import PEERS, Client, Peer, free_domain
+from tests.system.ros2.conftest import PEERS, Client, Peer
+from tests.system.ros2.environments import free_domain
 
 pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
 CONFIG = Path(terrain.scenarios.scenario.__file__).parent / "library" / "config" / "indoor_costmap.yaml"

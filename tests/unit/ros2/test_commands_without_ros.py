@@ -40,6 +40,7 @@ def test_what_is_missing_is_said_in_one_text(tmp_path):
         "--sensor names the topic scan twice": ["ros2", str(file), *2 * ["--sensor", "scan:LaserScan=lidar"]],
         "--sensor must be TOPIC:TYPE=SOURCE": ["ros2", str(file), "--sensor", "scan"],
         "the generators of ROS 2 are not installed": ["ros2-interfaces", "--into", str(tmp_path)],
+        "map_msgs, mbf_msgs, mesh_msgs, nav2_msgs, tf2_msgs, got dance_msgs": ["ros2-interfaces", "dance_msgs"],
     }
     command = [sys.executable, "-c", RUN, json.dumps(list(expected.values()))]
     ran = subprocess.run(command, env=without_ros(), capture_output=True, text=True, check=True)

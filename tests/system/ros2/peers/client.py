@@ -1,5 +1,6 @@
 """A client of the node: each line of stdin is a JSON order, and what comes of it is a JSON line on stdout."""
 
+import collections
 import json
 import sys
 import threading
@@ -55,6 +56,13 @@ def meet(key):
     say(key=key, what="ready")
 
 
+def find(key, actions):
+    """Wait for the servers of some actions."""
+    for action in actions:
+        clients[action].wait_for_server()
+    say(key=key, what="found")
+
+
 def pose(x, y, frame="map", w=1.0):
     stamped = PoseStamped()
     stamped.header.frame_id = frame
@@ -93,6 +101,26 @@ def send(key, action, target=None, path=None, **fields):
         say(key=key, what="result", status=status, outcome=result.outcome, message=result.message, poses=poses)
 
     clients[action].send_goal_async(goal, feedback_callback=feedback).add_done_callback(accepted)
+
+
+def repeat(key, number):
+    """Ask for a plan many times, each time when the one before has come, and count the outcomes."""
+    goal = GetPath.Goal(use_start_pose=True, start_pose=pose(0.0, 0.0), target_pose=pose(1.0, 0.0))
+    outcomes = collections.Counter()
+
+    def ask():
+        clients["get_path"].send_goal_async(goal).add_done_callback(
+            lambda future: future.result().get_result_async().add_done_callback(ended)
+        )
+
+    def ended(future):
+        outcomes[future.result().result.outcome] += 1
+        if outcomes.total() < number:
+            ask()
+        else:
+            say(key=key, what="repeated", outcomes=outcomes)
+
+    ask()
 
 
 def cancel(key):
@@ -146,7 +174,17 @@ def look(key, topic):
 
 
 threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
-orders = {"meet": meet, "send": send, "cancel": cancel, "call": call, "get": get, "put": put, "look": look}
+orders = {
+    "meet": meet,
+    "find": find,
+    "send": send,
+    "repeat": repeat,
+    "cancel": cancel,
+    "call": call,
+    "get": get,
+    "put": put,
+    "look": look,
+}
 for line in sys.stdin:
     order = json.loads(line)
     orders[order.pop("order")](**order)

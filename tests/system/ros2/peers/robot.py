@@ -2,7 +2,8 @@
 
 It stops by itself when no command has come for ``COMMAND_TIMEOUT``. It takes orders on stdin, one a line: the name
 of a topic and "off" or "on" silences it, "clock 12.5" sets simulated time, "fail now" publishes on ``fail``. Each line
-of the log is JSON: an order that was done, or a command that came, as its speed and where the robot was.
+of the log is JSON: an order that was done, a command that came, as its speed and where the robot was, or where it
+stopped by itself.
 """
 
 import json
@@ -55,8 +56,9 @@ class Robot(Node):
         return stamp
 
     def step(self):
-        if time.monotonic() - self.commanded > COMMAND_TIMEOUT:
+        if self.command != Twist() and time.monotonic() - self.commanded > COMMAND_TIMEOUT:
             self.command = Twist()
+            self.log(stood=True, x=self.x)
         turn, speed = self.command.angular.z, self.command.linear.x
         self.yaw += turn * PERIOD
         self.x += speed * math.cos(self.yaw) * PERIOD

