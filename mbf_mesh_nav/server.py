@@ -14,7 +14,7 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from mbf_abstract.config.bounded_files import named_file
+from mbf_abstract.config.bounded_files import configured_file
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
@@ -172,9 +172,9 @@ class MeshNavigationServer(MapServer):
         section = config.sections["mesh_map"]
         parameters = cast(MeshMapParameters, section.parameters)
         folder = config.path.parent
-        places = {"mesh_file": str(named_file(folder, mesh_file or parameters.mesh_file))}
+        places = {"mesh_file": str(configured_file(folder, mesh_file or parameters.mesh_file))}
         if parameters.cache_dir:
-            places["cache_dir"] = str(named_file(folder, parameters.cache_dir))
+            places["cache_dir"] = str(configured_file(folder, parameters.cache_dir))
         layer_classes: dict[str, Any] = {layer.type_name: layer.layer_class for layer in section.layers}
         try:
             return build_mesh_map(

@@ -26,7 +26,7 @@ _SPECIAL = (
 )
 
 
-def named_file(folder: Path | str, name: Path | str) -> Path:
+def configured_file(folder: Path | str, name: Path | str) -> Path:
     """The file that a configuration names: ``~`` is the home folder, other relative names count from ``folder``.
 
     A name with ``~`` whose home folder is not known stays as it is: there is no such file, and its reader reports that.

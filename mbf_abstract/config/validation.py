@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from mbf_abstract.config.bounded_files import named_file
+from mbf_abstract.config.bounded_files import configured_file
 from mbf_abstract.config.findings import Finding, KeyPath, describe_value, suggest
 from mbf_abstract.config.yaml_source import YamlDocument
 from mbf_abstract.parameters import ParameterModel
@@ -195,7 +195,7 @@ def _with_absolute_paths(model: type[BaseModel], data: object, folder: Path) -> 
         value = resolved.get(name)
         inner = _inner_model(field.annotation)
         if isinstance(value, str) and _holds_a_path(field.annotation):
-            resolved[name] = str(named_file(folder.absolute(), value))
+            resolved[name] = str(configured_file(folder.absolute(), value))
         elif inner is not None and isinstance(value, list):
             resolved[name] = [_with_absolute_paths(inner, item, folder) for item in value]
         elif inner is not None and isinstance(value, Mapping):

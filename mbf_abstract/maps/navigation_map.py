@@ -54,10 +54,6 @@ class NavigationMap(ABC):
         """Why no command may be computed on the map at ``now`` [s]; empty if it is fresh."""
         return ""
 
-    def is_current(self, now: float) -> bool:
-        """Whether a command may be computed on the map at ``now`` [s]."""
-        return not self.stale_reason(now)
-
     def update(self, robot_pose: Pose | None, now: float) -> object:
         """Bring the map up to ``now`` [s], and end overrides of layer parameters that are over.
 

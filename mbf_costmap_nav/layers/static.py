@@ -24,7 +24,7 @@ from collections import deque
 
 import numpy as np
 
-from mbf_abstract.config.bounded_files import named_file
+from mbf_abstract.config.bounded_files import configured_file
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.maps.view import FloorMap, FloorWindow
@@ -80,7 +80,7 @@ class StaticLayer(GridLayer):
     def _first_map(self) -> Costmap | None:
         context, p = self._context, self.parameters
         if p.map_file:
-            file, frame_id = named_file(context.base_folder, p.map_file), p.map_frame or context.frame_id
+            file, frame_id = configured_file(context.base_folder, p.map_file), p.map_frame or context.frame_id
             floor = load_map(file, context.max_cells, confined=context.confine_images)
             return self._costmap(floor, frame_id)
         if context.static_map is None and not p.map_topic:

@@ -5,7 +5,7 @@ When to use: for areas that people draw, as forbidden or slow ones. When not: fo
 
 from __future__ import annotations
 
-from mbf_abstract.config.bounded_files import named_file
+from mbf_abstract.config.bounded_files import configured_file
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.files.map_io import load_map
@@ -42,10 +42,10 @@ class AreaLayer(CostmapLayer):
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
         p, folder, limit = self.parameters, context.base_folder, context.max_cells
-        self.zones = p.zones + (load_zones(named_file(folder, p.zones_file)) if p.zones_file else ())
+        self.zones = p.zones + (load_zones(configured_file(folder, p.zones_file)) if p.zones_file else ())
         self.mask = None
         if p.mask_file:
-            mask_file = named_file(folder, p.mask_file)
+            mask_file = configured_file(folder, p.mask_file)
             self.mask = load_map(mask_file, limit, confined=context.confine_images).axis_aligned(limit)
         self.placement = Placement(p.map_frame, context)
 

@@ -28,8 +28,6 @@ class VectorField:
     goal_face : int
     goal : (3,) float64
         Where the field leads to [m].
-    map_version : int
-        Version of the snapshot it was computed on.
     topology : MeshTopology
         The mesh it belongs to; on another one its vectors are invalid.
     """
@@ -38,7 +36,6 @@ class VectorField:
     distances: Float32Array
     goal_face: int
     goal: FloatArray
-    map_version: int
     topology: MeshTopology
 
     def __post_init__(self) -> None:

@@ -180,9 +180,7 @@ class WaveSearch:
         corners = mesh_map.faces[goal.face]
         towards_goal = goal.point - mesh_map.vertices[corners]
         directions[corners] = towards_goal / np.maximum(norm(towards_goal)[..., None], 1e-9)
-        return VectorField(
-            directions, wave.distances, goal.face, goal.point.copy(), query.snapshot.version, mesh_map.topology
-        )
+        return VectorField(directions, wave.distances, goal.face, goal.point.copy(), mesh_map.topology)
 
     def _propagated(self, query: LegQuery, targets: IntArray, overshoot: float, along_edges: bool) -> Wave | None:
         """Run the kernel from the goal of a query; None if cancelled."""

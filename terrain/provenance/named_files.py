@@ -20,6 +20,7 @@ from xml.sax.saxutils import quoteattr
 
 import yaml
 
+from mbf_abstract.config.bounded_files import configured_file
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.config.yaml_source import read_yaml
 from terrain.description.mesh_files import FORMATS, MAX_BYTES, find_file
@@ -43,7 +44,7 @@ def named_file(text: object, folder: Path) -> Path | None:
     """Return the file that a value names, seen from ``folder``; None if it names none."""
     if not isinstance(text, str) or not Path(text).suffix or "\0" in text or len(text.encode()) > MAX_NAME:
         return None
-    file = folder / text
+    file = configured_file(folder, text)
     return file if file.is_file() else None
 
 

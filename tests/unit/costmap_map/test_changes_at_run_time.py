@@ -145,7 +145,7 @@ def test_padding_and_age_of_one_map_change(site):
     server, _, _ = site
     server.set_map_parameters("local_costmap", footprint_padding=0.1, max_age=0.0)
     assert server.local_costmap.inscribed_radius > server.global_costmap.inscribed_radius
-    assert server.local_costmap.is_current(1e6) and not server.global_costmap.is_current(1e6)
+    assert not server.local_costmap.stale_reason(1e6) and server.global_costmap.stale_reason(1e6)
 
 
 def test_a_robot_too_large_for_the_inflation_is_reported(site):

@@ -164,7 +164,7 @@ def test_on_another_grid_the_newest_scan_is_marked_again_at_once():
     one.take_floor("/map", floor(90, 80, x=-4.0, y=-4.0))
     one.update(None, 0.1)
     assert (one.geometry.width, one.snapshot().cost_at(2.05, 0.05)) == (90, LETHAL)
-    assert one.is_current(0.1)
+    assert not one.stale_reason(0.1)
 
 
 def test_an_update_changes_its_window_alone():
@@ -203,7 +203,7 @@ def test_a_map_that_is_too_large_is_refused_and_the_old_one_stays():
         with pytest.raises(ValueError, match=text):
             one.take_floor("/map", large)
     one.update(None, 0.1)
-    assert one.geometry == GridGeometry(100, 100, 0.1, -5.0, -5.0) and one.is_current(0.1) is False
+    assert one.geometry == GridGeometry(100, 100, 0.1, -5.0, -5.0) and one.stale_reason(0.1)
 
 
 def test_while_a_layer_cannot_take_the_new_grid_the_costmap_is_stale_until_the_next_map():

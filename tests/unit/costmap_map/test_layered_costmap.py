@@ -176,7 +176,7 @@ def test_a_map_is_not_current_before_its_first_update_nor_long_after_the_last(bu
     costmap = build("static", max_age=2.0)
     assert costmap.stale_reason(0.0) == "the costmap has not been updated yet"
     costmap.update(None, 10.0)
-    assert costmap.is_current(12.0)
+    assert not costmap.stale_reason(12.0)
     assert "2.50 s old" in costmap.stale_reason(12.5)
 
 
@@ -186,7 +186,7 @@ def test_a_silent_sensor_makes_the_map_not_current_by_default(build):
     assert "'laser' has not sent anything" in costmap.stale_reason(0.0)
     costmap.insert_points("laser", [(1.0, 1.0, 0.0)], (0.0, 0.0, 0.0), 0.0)
     costmap.update(None, 1.0)
-    assert costmap.is_current(1.0)
+    assert not costmap.stale_reason(1.0)
     costmap.update(None, 1.5)
     assert "layer 'obstacle': observation source 'laser' is silent for 1.50 s" in costmap.stale_reason(1.5)
 
@@ -200,13 +200,13 @@ def test_a_stamp_from_the_future_is_reported_and_does_not_cover_silence(build, l
         costmap.update(None, now)
 
     see(10.1, 10.0)
-    assert costmap.is_current(10.0), "clocks differ a little"
+    assert not costmap.stale_reason(10.0), "clocks differ a little"
     see(1e6, 10.1)
     for now in (10.1, 50.0, 1000.0):
         costmap.update(None, now)
         assert "'laser' has a stamp" in costmap.stale_reason(now)
     see(1000.0, 1000.0)
-    assert costmap.is_current(1000.0), "the source is right again"
+    assert not costmap.stale_reason(1000.0), "the source is right again"
     costmap.update(None, 1002.0)
     assert "'laser' is silent for 2.00 s" in costmap.stale_reason(1002.0)
 
@@ -239,14 +239,14 @@ def test_a_cleared_map_is_not_current_before_it_sees_again(build, layer, clear):
 
     see(0.0)
     costmap.update(HERE, 0.0)
-    assert costmap.is_current(0.0)
+    assert not costmap.stale_reason(0.0)
     clear(costmap)
     costmap.update(HERE, 0.1)
     assert "'laser' is in the map since it was cleared" in costmap.stale_reason(0.1)
     see(0.2)
-    assert not costmap.is_current(0.2)
+    assert costmap.stale_reason(0.2)
     costmap.update(HERE, 0.2)
-    assert costmap.is_current(0.2)
+    assert not costmap.stale_reason(0.2)
 
 
 def test_an_unknown_source_is_refused_with_the_known_ones(build, seeing):
@@ -328,7 +328,7 @@ def test_a_sonar_that_is_cleared_forgets_its_readings(build):
     costmap = build("range_sensor", range_sensor=block)
     costmap.insert_scan(RangeScan.of_rays("sonar", (2.0, 5.5, 0.0), [(5.5, 5.5, 0.0)], [True], 0.0))
     costmap.update(None, 0.0)
-    assert lethal_cells(costmap) == {(5, 5)} and costmap.is_current(0.5) and not costmap.is_current(1.5)
+    assert lethal_cells(costmap) == {(5, 5)} and not costmap.stale_reason(0.5) and costmap.stale_reason(1.5)
     costmap.clear()
     costmap.update(None, 0.1)
     assert lethal_cells(costmap) == set()

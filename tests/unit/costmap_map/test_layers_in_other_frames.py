@@ -97,7 +97,7 @@ def test_while_the_frame_is_unknown_the_map_is_not_current_and_empty():
     assert (costmap.snapshot().cells == UNKNOWN).all()
     transforms.set(odom_at(0.0, 0.0, 0.0))
     costmap.update(None, 0.1)
-    assert costmap.is_current(0.1) and not (costmap.snapshot().cells == UNKNOWN).all()
+    assert not costmap.stale_reason(0.1) and not (costmap.snapshot().cells == UNKNOWN).all()
 
 
 def test_clearing_returns_to_the_placed_map():
@@ -125,7 +125,7 @@ def test_a_map_file_has_the_frame_it_is_given(frame, tmp_path):
         CostmapParameters.model_validate(WALLS), {"walls": block}, base_folder=tmp_path, transforms=TransformBuffer()
     )
     costmap.update(None, 0.0)
-    assert costmap.is_current(0.0) == (frame == "")
+    assert (not costmap.stale_reason(0.0)) == (frame == "")
 
 
 # ------------------------------------------------------------------------------------------- zones and masks
@@ -180,6 +180,6 @@ def test_filters_follow_their_frame_and_without_it_the_map_is_not_current(tmp_pa
         odom = Transform((x, 0.5, 0.0), quaternion_from_yaw(0.6), "map", "odom", stamp)
         transforms.set(odom)
         costmap.update(None, stamp)
-        assert costmap.is_current(stamp)
+        assert not costmap.stale_reason(stamp)
         assert costmap.snapshot().cost_at(*on(odom, INSIDE)) == LETHAL
         assert costmap.snapshot().cost_at(*on(odom, OUTSIDE)) == UNKNOWN

@@ -192,24 +192,24 @@ def test_points_are_projected_along_the_configured_axis():
 def test_map_is_stale_when_no_cloud_came_within_the_expected_rate():
     mesh = floor_map(expected_update_rate=0.5)
 
-    assert not mesh.is_current(0.0)
+    assert mesh.stale_reason(0.0)
     see(mesh, np.zeros((0, 3)), 10.0)
-    assert mesh.is_current(10.4)
-    assert not mesh.is_current(10.6)
-    assert floor_map(expected_update_rate=0.0).is_current(1e9)
-    assert not floor_map().is_current(1e9), "a silent sensor is noticed by default"
+    assert not mesh.stale_reason(10.4)
+    assert mesh.stale_reason(10.6)
+    assert not floor_map(expected_update_rate=0.0).stale_reason(1e9)
+    assert floor_map().stale_reason(1e9), "a silent sensor is noticed by default"
 
 
 def test_a_cleared_map_is_not_current_before_it_sees_again():
     mesh = floor_map()
     see(mesh, post(2.0, 2.0), 10.0)
-    assert mesh.is_current(10.1)
+    assert not mesh.stale_reason(10.1)
 
     mesh.clear()
 
-    assert not mesh.is_current(10.1)
+    assert mesh.stale_reason(10.1)
     see(mesh, post(2.0, 2.0), 10.2)
-    assert mesh.is_current(10.2)
+    assert not mesh.stale_reason(10.2)
 
 
 def test_changed_robot_height_applies_to_the_next_cloud():
@@ -340,9 +340,9 @@ def test_a_silent_sensor_is_noticed_while_another_speaks():
     see(mesh, post(1.0, 1.0), 1.0, source="front")
     see(mesh, post(3.0, 3.0), 1.0, source="rear")
     see(mesh, post(3.0, 3.0), 2.0, source="rear")
-    assert not mesh.is_current(2.0)
+    assert mesh.stale_reason(2.0)
     see(mesh, post(1.0, 1.0), 2.0, source="front")
-    assert mesh.is_current(2.0)
+    assert not mesh.stale_reason(2.0)
 
 
 def test_a_layer_listens_to_its_own_sensors_only_and_waits_for_each():
@@ -351,9 +351,9 @@ def test_a_layer_listens_to_its_own_sensors_only_and_waits_for_each():
         see(mesh, post(1.0, 1.0), 1.0, source="ceiling")
     assert not mesh.snapshot().lethal.any()
     see(mesh, post(1.0, 1.0), 1.0, source="front")
-    assert mesh.snapshot().lethal.any() and not mesh.is_current(1.0)
+    assert mesh.snapshot().lethal.any() and mesh.stale_reason(1.0)
     see(mesh, post(1.0, 1.0), 1.0, source="rear")
-    assert mesh.is_current(1.0)
+    assert not mesh.stale_reason(1.0)
 
 
 def test_a_cloud_of_nothing_but_unknown_points_says_nothing():
@@ -361,15 +361,15 @@ def test_a_cloud_of_nothing_but_unknown_points_says_nothing():
     see(mesh, post(2.0, 2.0), 1.0)
     before = mesh.snapshot()
     see(mesh, np.full((5, 3), np.nan), 3.0)
-    assert mesh.snapshot() is before and not mesh.is_current(3.0)
+    assert mesh.snapshot() is before and mesh.stale_reason(3.0)
 
 
 def test_a_stamp_from_the_future_is_no_sign_of_life():
     mesh = floor_map()
     see(mesh, post(2.0, 2.0), 1e6)
-    assert not mesh.is_current(2.0)
+    assert mesh.stale_reason(2.0)
     see(mesh, post(2.0, 2.0), 2.1)
-    assert mesh.is_current(2.0), "clocks differ a little"
+    assert not mesh.stale_reason(2.0), "clocks differ a little"
 
 
 @pytest.mark.parametrize(("origin", "stamp"), [([np.nan, 0.0, 0.5], 1.0), (SENSOR, np.nan), (SENSOR, np.inf)])
@@ -391,7 +391,7 @@ def test_a_disabled_layer_leaves_the_map_free_and_fresh_until_it_is_enabled_agai
     seen = mesh.snapshot().lethal.copy()
     settings = mesh.layers["seen"].parameters
     mesh.set_layer_parameters("seen", settings.model_copy(update={"enabled": False}))
-    assert seen.any() and not mesh.snapshot().lethal.any() and mesh.is_current(100.0)
+    assert seen.any() and not mesh.snapshot().lethal.any() and not mesh.stale_reason(100.0)
     see(mesh, post(1.0, 1.0), 2.0, source="front")
     assert not mesh.snapshot().lethal.any()
     mesh.set_layer_parameters("seen", settings)

@@ -64,6 +64,20 @@ def test_two_files_of_one_name_become_two_copies(tmp_path):
     assert [(tmp_path / name).read_text() for name in renamed["maps"][:2]] == ["one", "two"]
 
 
+def test_a_file_in_the_home_folder_is_copied_with_what_names_it(tmp_path, monkeypatch):
+    home, folder = tmp_path / "home", tmp_path / "configuration"
+    for place in (home, folder, tmp_path / "run"):
+        place.mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    (home / "map.png").write_text("pixels")
+    (folder / "a.yaml").write_text("{map_file: ~/map.png, other: ~nobody-of-this-name/map.png}")
+    copy = tmp_path / "run" / InputCopies(tmp_path / "run").copy(folder / "a.yaml")
+    shutil.rmtree(home)
+    named = yaml.safe_load(copy.read_text())
+    assert (copy.parent / named["map_file"]).read_text() == "pixels"
+    assert named["other"] == "~nobody-of-this-name/map.png"
+
+
 def test_numbers_of_a_gltf_beside_it_are_copied_with_it(tmp_path):
     (tmp_path / "scene.gltf").write_text(json.dumps({"buffers": [{"uri": "data/numbers.bin"}, {"uri": "data:,x"}]}))
     (tmp_path / "data").mkdir()
