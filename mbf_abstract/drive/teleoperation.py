@@ -23,6 +23,8 @@ from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult, PluginKind
 
 OWNER = "teleoperation"
+TAKING_OVER = "taking over"
+"""The problem until the first command."""
 REACTION_TIME = 0.3
 """Time [s] that passes before a robot begins to brake."""
 DECELERATION = 0.5
@@ -64,7 +66,7 @@ class Teleoperation:
         if self._grip is not None and self._grip.has_failed:
             return
         if self._grip is None or self._grip.is_over:
-            self.problem = ""
+            self.problem = TAKING_OVER
             self._grip = grip = _Grip(self._runtime, self._take_problem)
             grip.hold(command)
             self._runtime.clock.spawn(grip.drive, OWNER)

@@ -164,7 +164,7 @@
     knob.style.transform = `translate(${-turn * PAD * 0.7}px, ${-forward * PAD * 0.7}px)`;
     knob.style.background = stick ? "#1f6feb" : "#8a8f98";
   };
-  const showStatus = (text) => { if (status) status.textContent = stick ? text || "driving" : "Hold to drive, or space + WASD"; };
+  const showStatus = (text) => { if (status) status.textContent = stick ? text || "taking over" : "Hold to drive, or space + WASD"; };
   const letGo = () => { held.clear(); if (stick) hold(null); };
   const addStick = () => {
     const card = element(root, "div", "position:absolute;right:10px;bottom:10px;padding:6px;width:130px;" +
