@@ -33,7 +33,7 @@ class MapHooks(Protocol):
         """Why the map must not be driven on right now (e.g. a silent sensor); empty = it is current."""
 
     def missing_floor(self) -> str:
-        """Which floor has not come yet, so that nothing can be planned; empty if all are there."""
+        """Which floor has not come yet, or cannot be placed, so that nothing can be planned; empty if all are there."""
 
     def floors_taken(self) -> int:
         """How many floors the map has taken up at run time; a plan of before is one on another floor."""

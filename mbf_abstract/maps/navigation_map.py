@@ -96,7 +96,7 @@ class NavigationMap(ABC):
         raise ValueError(f"no layer of the map takes a floor from {topic}")
 
     def missing_floor(self) -> str:
-        """Which floor has not come yet, so that nothing can be planned; empty if all are there."""
+        """Which floor has not come yet, or cannot be placed, so that nothing can be planned; empty if all are there."""
         return ""
 
     # -------------------------------------------------------------------------------------------------- places

@@ -68,7 +68,7 @@ class MapInterface(PluginHost):
         raise ValueError(f"the {self.config.backend} server takes no floor from {topic}")
 
     def missing_floor(self) -> str:
-        """Which floor has not come yet, so that nothing can be planned; empty if all are there."""
+        """Which floor has not come yet, or cannot be placed, so that nothing can be planned; empty if all are there."""
         return ""
 
     def floors_taken(self) -> int:

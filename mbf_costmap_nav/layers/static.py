@@ -11,8 +11,9 @@ and the costmap is not current.
 
 With ``map_topic`` the map comes while the server runs, from a SLAM or a map server; in its header's frame, and the grid
 of a costmap that does not roll becomes that of the map. Until the first one has come nothing can be planned, unless
-there is a ``map_file``, too. What sensors have marked is kept where only the values of cells change; on another grid
-only their newest scans are. As such a map may change, no goal counts as unreachable for ever because of it.
+there is a ``map_file``, too; nor is there a plan while the frame of the map that has come is unknown. What sensors have
+marked is kept where only the values of cells change; on another grid only their newest scans are. As such a map may
+change, no goal counts as unreachable for ever because of it.
 
 The interpretation of values is that of costmap_2d's static layer, but ``trinary_costmap`` is off by default; map files
 in trinary mode give the same result either way.
@@ -108,18 +109,19 @@ class StaticLayer(GridLayer):
     def take_floor(self, floor: FloorMap | FloorWindow) -> None:
         """Keep a map, or the last one with its change; one that says nothing new is ignored.
 
-        Raises ValueError where it has more than ``max_cells``, or is a change of a map that has not come.
+        Raises ValueError where it has more than ``max_cells``, or is a change of one that has not come, or was refused.
         """
         if isinstance(floor, FloorWindow):
             if self._floor is None:
-                raise ValueError(f"the update comes before the first map on {self.map_topic}")
+                raise ValueError(f"the update comes before its map on {self.map_topic}")
             floor = self._floor.with_window(floor)
+        last, self._floor = self._floor, None  # changes of a map that is refused are none of the last one
         height, width = floor.occupancy.shape
         if height * width > self._context.max_cells:
             raise ValueError(f"{width} x {height} cells are more than the limit of {self._context.max_cells}")
         axis_aligned_shape(floor.occupancy.shape, floor.yaw, self._context.max_cells)
-        if self._floor is None or not floor.equals(self._floor):
-            self._floor = floor
+        self._floor = floor
+        if last is None or not floor.equals(last):
             self._waiting.append(floor)
 
     def place_floor(self) -> bool:
@@ -187,9 +189,18 @@ class StaticLayer(GridLayer):
                 self._map, self.geometry, box, self.default_value, self._placement.T_data_costmap
             )
 
+    def missing_floor(self) -> str:
+        """Why the map of the topic is not there: none has come, or its frame has never been known."""
+        placement = self._placement
+        if self._map is None:
+            return f"no map has come on {self.map_topic} yet"
+        if not self.map_topic or placement.known:
+            return ""
+        return f"the map of {self.map_topic} cannot be placed: {placement.problem}"
+
     def stale_reason(self, now: float) -> str:
         """Why there is no map, or it cannot be placed because its frame is unknown."""
-        return f"no map has come on {self.map_topic} yet" if self._map is None else self._placement.problem
+        return self.missing_floor() or self._placement.problem
 
     def reset(self) -> None:
         """Return to the map as loaded, undoing cleared areas."""

@@ -123,6 +123,13 @@ class CostmapLayer(MapLayer):
         """
         return False
 
+    def missing_floor(self) -> str:
+        """Why the floor plan of ``map_topic`` is not there, so that nothing can be planned; empty if all is well.
+
+        Called on any thread.
+        """
+        return ""
+
     def match_geometry(self, geometry: GridGeometry) -> None:
         """Take over a new grid and forget all cells."""
         self.geometry = geometry

@@ -109,9 +109,9 @@ class LayeredCostmap(SnapshotAnswers):
             layer.take_floor(floor)
 
     def missing_floor(self) -> str:
-        """The first layer whose floor plan has not come."""
-        waiting = (layer for layer in self.layers.enabled if layer.map_topic and layer.floor_plan is None)
-        return next((f"layer {one.name!r}: no map has come on {one.map_topic} yet" for one in waiting), "")
+        """That of the first enabled layer which misses one."""
+        reasons = ((layer.name, layer.missing_floor()) for layer in self.layers.enabled)
+        return next((f"layer {name!r}: {reason}" for name, reason in reasons if reason), "")
 
     # ------------------------------------------------------------------------------------------------ reading
     def snapshot(self) -> Costmap:
@@ -222,12 +222,18 @@ class LayeredCostmap(SnapshotAnswers):
                 if layer.place_floor():
                     self.floors_taken += 1
                     self._unmoved.add(layer.name)
-                    self._pending = self.geometry.box
+                    self._block()
         geometry = self._preferred_geometry()
         if geometry is not None and geometry != self.geometry:
-            self.geometry, self._pending = geometry, geometry.box
-            self._cells = np.full((geometry.height, geometry.width), LETHAL, dtype=np.uint8)  # if a layer raises now
+            self.geometry = geometry
             self._unmoved |= set(self.layers)
+            self._block()
+
+    def _block(self) -> None:
+        """Forbid all cells until the update is done: if a layer raises now, nobody plans over the last floor."""
+        self._cells = np.full((self.geometry.height, self.geometry.width), LETHAL, dtype=np.uint8)
+        self._pending, self._snapshot = self.geometry.box, None
+        self._version += 1
 
     def _preferred_geometry(self) -> GridGeometry | None:
         """Grid that a layer wants the map to have; None if none wants one, or the window rolls."""

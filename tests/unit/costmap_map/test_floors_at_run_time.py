@@ -188,7 +188,7 @@ def test_an_update_changes_its_window_alone():
 )
 def test_an_update_that_does_not_fit_its_map_is_refused(window, text):
     one = costmap()
-    with pytest.raises(ValueError, match="before the first map on /map"):
+    with pytest.raises(ValueError, match="before its map on /map"):
         one.take_floor("/map", window)
     one.take_floor("/map", floor())
     with pytest.raises(ValueError, match=text):
@@ -204,21 +204,26 @@ def test_a_map_that_is_too_large_is_refused_and_the_old_one_stays():
             one.take_floor("/map", large)
     one.update(None, 0.1)
     assert one.geometry == GridGeometry(100, 100, 0.1, -5.0, -5.0) and one.stale_reason(0.1)
+    with pytest.raises(ValueError, match="before its map on /map"):  # of the large one, not of the old one
+        one.take_floor("/map", FloorWindow(np.full((2, 3), 100, dtype=np.uint8), 10, 20))
+    one.take_floor("/map", floor())
+    one.take_floor("/map", FloorWindow(np.full((2, 3), 100, dtype=np.uint8), 10, 20))
 
 
-def test_while_a_layer_cannot_take_the_new_grid_the_costmap_is_stale_until_the_next_map():
+def test_while_a_layer_cannot_take_the_new_grid_the_costmap_is_stale_and_blocked_until_the_next_map():
     parameters = CostmapParameters(
         layers=[{"name": "walls", "type": "static"}, {"name": "inflation", "type": "inflation"}]
     )
     one = build_layered_costmap(parameters, {"walls": {"map_topic": "/map"}})
     one.take_floor("/map", floor())
     one.update(None, 0.0)
+    assert (one.snapshot().cells == FREE).all()
     one.take_floor("/map", floor(resolution=1e-4))
     for now in (0.1, 0.2):
         with pytest.raises(ValueError, match="inflation_radius is"):
             one.update(None, now)
         assert "layer 'inflation' raised ValueError" in one.stale_reason(now)
-        assert one.snapshot().resolution == 0.1 or not (one.snapshot().cells == FREE).any()
+        assert (one.snapshot().cells == LETHAL).all()
     one.take_floor("/map", floor())
     one.update(None, 0.3)
     assert one.stale_reason(0.3) == "" and (one.snapshot().cells == FREE).all()
@@ -231,9 +236,10 @@ def test_a_map_in_another_frame_is_placed_by_its_transform(tmp_path):
     one.take_floor("/map", floor(20, 20, 0.1, 0.0, 0.0, wall=lambda ys: ys < 9.0, frame_id="floor"))
     one.update(None, 0.0)
     assert "floor" in one.stale_reason(0.0)
+    assert one.missing_floor().startswith("layer 'walls': the map of /map cannot be placed: no transform from")
     transforms.set(Transform((1.0, 0.0, 0.0), parent="map", child="floor", static=True))
     one.update(None, 0.1)
-    assert one.stale_reason(0.1) == "" and one.geometry.width == 40
+    assert (one.stale_reason(0.1), one.missing_floor(), one.geometry.width) == ("", "", 40)
     assert [one.snapshot().cost_at(x, 1.0) for x in (1.05, 2.05)] == [FREE, LETHAL]
 
 
@@ -272,6 +278,18 @@ def test_a_new_map_without_a_way_ends_the_goal_whatever_becomes_of_failed_replan
     come(site, floor(wall=lambda ys: ys < 9.0))
     assert goal.wait(20.0).outcome == GetPathOutcome.NO_PATH_FOUND
     assert site.robot.pose.x < 0.9
+
+
+def test_on_a_map_that_cannot_be_placed_nothing_is_planned_and_a_goal_ends(site):
+    come(site, floor())
+    goal = site.send(MoveBaseGoal(Pose.planar(3.0, 0.0)))
+    site.server.runtime.clock.sleep(0.7)
+    come(site, floor(wall=lambda ys: ys < 9.0, frame_id="elsewhere"))
+    ended, text = goal.wait(20.0), "the map of /map cannot be placed: no transform from"
+    assert ended.outcome == GetPathOutcome.MAP_ERROR and text in ended.message
+    assert site.robot.pose.x < 0.9
+    come(site, floor())
+    assert site.go_to(Pose.planar(3.0, 0.0)).success
 
 
 def test_a_map_that_says_nothing_new_changes_nothing(site):
