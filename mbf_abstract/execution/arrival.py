@@ -72,6 +72,8 @@ class ArrivalCheck:
     def within(self, pose: Pose, tracker: PathTracker) -> bool:
         """Whether ``pose`` is inside both tolerances, at the end of the path and not where the path passes earlier."""
         close = ground_distance(pose, self.goal, self.same_storey) < self.dist_tolerance
-        lift = at_height_of(pose, self.goal).distance_to(pose)  # a path may climb to a goal above the ground
+        lift = at_height_of(pose, self.goal, self.same_storey).distance_to(
+            pose
+        )  # a path may climb to a goal above the ground
         driven = tracker.has_arrived(self.dist_tolerance + STRAYING * tracker.deviation + lift)
         return close and driven and abs(heading_error(pose, self.goal)) < self.angle_tolerance

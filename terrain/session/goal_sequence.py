@@ -18,6 +18,7 @@ from terrain.session.executives import GoalExecutive
 from terrain.session.session import Session
 
 NO_GOALS = MoveBaseResult(MoveBaseOutcome.FAILURE, "the scenario has no goals")
+REPLACED = "a new goal was asked for"
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class GoalSequence:
         self._following: AnyGoalHandle | None = None
         self._end: MoveBaseResult | None = None
         self._deadline = float("inf")
-        session.loop.on_tick.append(self._watch_time)
+        session.loop.on_tick.append(self._watch)
         session.loop.on_failure.append(lambda: self.end("the simulation has failed"))
 
     def visit_goals(self) -> MoveBaseResult:
@@ -109,7 +110,7 @@ class GoalSequence:
         with self._condition:
             self._next = goal
             self._condition.notify_all()
-        self.cancel("a new goal was asked for")
+        self.cancel(REPLACED)
 
     def cancel(self, reason: str) -> None:
         """Cancel the present goal or waypoints; the rest of the scenario goes with it."""
@@ -179,7 +180,12 @@ class GoalSequence:
             asked, self._next = self._next, None
             return asked if self._end is None else None
 
-    def _watch_time(self, time: float) -> None:
+    def _watch(self, time: float) -> None:
+        """Between two steps of the world: end a goal that is late, or began while another or the end was asked for."""
+        if self.target is not None and self._end is not None:
+            self.cancel(self._end.message)
+        elif self.target is not None and self._next is not None:
+            self.cancel(REPLACED)
         if time >= self._deadline:
             self._deadline = float("inf")
             self.cancel(f"the time limit of {self._session.scenario.time_limit:g} s")

@@ -53,6 +53,8 @@ class LiveControls:
         Plugins for the goals to come; empty = the first ones loaded.
     holding : bool
         Whether goals are paused, those to come as well.
+    by_hand : bool
+        Whether somebody drives by hand, so that no goal may drive.
     placing : Placing
     waypoints : tuple of Pose
         Those that were placed.
@@ -64,6 +66,7 @@ class LiveControls:
         self.planner = ""
         self.controller = ""
         self.holding = False
+        self.by_hand = False
         self.placing = Placing.GOAL
         self.waypoints: tuple[Pose, ...] = ()
         self._session = session
@@ -86,6 +89,8 @@ class LiveControls:
                 self._log("refused", message=f"{type(error).__name__}: {error}")
         if self.holding:
             self._server.pause_all()  # in every step, for goals that an executive has sent since the last one
+        if self.by_hand:
+            self._cancel_for_teleoperation()  # likewise
 
     # ------------------------------------------------------------------------------- commands, to be posted
     def place(self, ray: Ray, facing: Ray | None = None) -> None:
@@ -111,7 +116,14 @@ class LiveControls:
         self.go_to_pose(pose) if self.placing is Placing.GOAL else self.add_waypoint(pose)
 
     def go_to_pose(self, goal: Pose) -> None:
-        """Go there."""
+        """Go there.
+
+        Raises
+        ------
+        ValueError
+            Somebody drives by hand.
+        """
+        self._check_nobody_drives()
         self._log("new goal", x=round(goal.x, 3), y=round(goal.y, 3), z=round(goal.z, 3), yaw=round(goal.yaw, 3))
         self._sequence.go_to(AskedGoal(goal, self.planner, self.controller))
 
@@ -141,8 +153,9 @@ class LiveControls:
         Raises
         ------
         ValueError
-            There are none.
+            There are none, or somebody drives by hand.
         """
+        self._check_nobody_drives()
         if not self.waypoints:
             raise ValueError("there are no waypoints to drive")
         self._log("drive waypoints", waypoints=len(self.waypoints), loops=loops)
@@ -154,12 +167,14 @@ class LiveControls:
         self._sequence.cancel(f"canceled in {self._place}")
 
     def take_over(self) -> None:
-        """Cancel what drives the robot, because somebody drives it by hand."""
+        """Cancel what drives the robot, and what would begin to, because somebody drives it by hand."""
         self._log("teleoperation")
-        self._sequence.cancel(f"teleoperation in {self._place}")
+        self.by_hand = True
+        self._cancel_for_teleoperation()
 
     def note_end_of_teleoperation(self, reason: str) -> None:
-        """Log why nobody drives the robot by hand any more."""
+        """Allow goals again, and log why nobody drives the robot by hand any more."""
+        self.by_hand = False
         self._log("end of teleoperation", reason=reason)
 
     def hold(self, holding: bool) -> None:
@@ -195,6 +210,13 @@ class LiveControls:
     def ground_rays(self) -> StaticRays:
         """Rays at the ground of the world."""
         return StaticRays(*self._session.world.ground)
+
+    def _check_nobody_drives(self) -> None:
+        if self.by_hand:
+            raise ValueError("somebody drives the robot by hand: a goal can be set once the stick is released")
+
+    def _cancel_for_teleoperation(self) -> None:
+        self._sequence.cancel(f"teleoperation in {self._place}")
 
     def _log(self, what: str, **facts: object) -> None:
         """Log what a visitor has done to the run."""

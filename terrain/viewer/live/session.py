@@ -158,6 +158,7 @@ class LiveSession:
 
     def __exit__(self, *exc: object) -> None:
         self._session.loop.on_tick.remove(self._after_step)
+        self._stick.stop("the run has ended")
         self._session.events.remove_sink(self._log)
         self._exits.close()
 

@@ -176,13 +176,21 @@
     knob = element(pad, "div", "width:36px;height:36px;border-radius:50%;background:#8a8f98;");
     status = element(card, "div", "font-size:11px;line-height:1.3;min-height:2.6em;");
     showStatus("");
-    listen(pad, "pointerdown", (event) => { swallow(event); pad.setPointerCapture(event.pointerId); hold(field(event)); });
+    listen(pad, "pointerdown", (event) => {
+      swallow(event);
+      if (event.button !== 0) { letGo(); return; }
+      pad.setPointerCapture(event.pointerId);
+      hold(field(event));
+    });
     listen(pad, "pointermove", (event) => { if (stick && event.buttons) hold(field(event)); });
+    listen(window, "contextmenu", letGo); // a menu takes the pointer; its release may never come
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) listen(pad, end, letGo);
     listen(window, "keydown", (event) => {
       if (event.target.closest?.("input,textarea,select,[contenteditable]")) return;
+      if (event.metaKey || event.ctrlKey || event.altKey) { letGo(); return; } // then releases of keys may never come
       if (event.code !== "Space" && !(held.has("Space") && event.code in KEYS)) return;
       swallow(event);
+      if (event.repeat) return; // still down, perhaps since before the stick was let go
       held.add(event.code);
       hold(ofKeys());
     });

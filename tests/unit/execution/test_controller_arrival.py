@@ -161,6 +161,14 @@ def test_on_level_maps_no_height_counts():
         assert not level.reached(Pose.planar(0.3, 0.0), driven_to_its_end(), False)
 
 
+def test_on_level_maps_a_path_may_climb_to_its_goal():
+    climbing = PathTracker(Path.from_points([(0.0, 0.0, 0.0), (5.0, 0.0, 0.0), (5.0, 0.0, 2.0)]))
+    for x in (0.0, 2.5, 5.0):
+        climbing.update((x, 0.0, 0.0))
+    check = ArrivalCheck(Pose.planar(5.0, 0.0, z=2.0), 0.25, 0.25, "exclusive", same_storey=math.inf)
+    assert check.reached(Pose.planar(5.0, 0.0), climbing, False)
+
+
 @pytest.mark.parametrize("velocity", [Twist.planar(1.0), Twist.planar(0.0, 1.0), Twist.planar(wz=1.0)])
 @pytest.mark.parametrize("force_stop", [True, False])
 def test_f089_speed_at_the_goal_counts_only_with_force_stop(make_session, velocity, force_stop):

@@ -89,10 +89,11 @@ class Page:
         await self.key_down(key)
         await self.key_up(key)
 
-    async def key_down(self, key, code=""):
-        """Press a key and hold it; ``code`` names its place on the keyboard, as in JavaScript."""
+    async def key_down(self, key, code="", modifiers=0, repeat=False):
+        """Press a key and hold it; ``code`` names its place on the keyboard, as in JavaScript; 4 is Meta."""
         text = {"text": key} if len(key) == 1 else {}
-        await self.command("Input.dispatchKeyEvent", type="keyDown", key=key, code=code, **text)
+        how = {"modifiers": modifiers, "autoRepeat": repeat, **text}
+        await self.command("Input.dispatchKeyEvent", type="keyDown", key=key, code=code, **how)
 
     async def key_up(self, key, code=""):
         """Release a key."""

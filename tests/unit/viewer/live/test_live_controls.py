@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import Pose
 from terrain.scenarios.faults import LocalizationJump, SensorFault
 from terrain.viewer.live.controls import MAX_WAITING
 
@@ -126,3 +127,16 @@ def test_of_too_many_commands_the_newest_are_done(steered):
     run.controls.work_off()
 
     assert done == list(range(5, MAX_WAITING + 5))
+
+
+@pytest.mark.parametrize("executive", ["move_base", "navigation"])
+@pytest.mark.parametrize("waypoints", [False, True])
+def test_an_end_that_is_asked_for_while_a_goal_is_about_to_begin_ends_it(steered, executive, waypoints):
+    run = steered(executive)
+    run.sequence.on_goal.append(lambda goal: run.sequence.end("enough"))
+    run.controls.waypoints = (Pose.planar(9.0, 8.0),)
+    run.at(1.0, run.controls.drive_waypoints if waypoints else lambda: run.controls.go_to_pose(Pose.planar(9.0, 8.0)))
+
+    result = run.visit_goals()
+
+    assert result.outcome_name == "CANCELED" and result.message == "enough"

@@ -3,13 +3,14 @@
 import pytest
 
 from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import Pose
 from terrain.viewer.live.stick import SILENCE, Stick
 
 
 @pytest.fixture
-def by_hand(steered):
+def by_hand(request, steered):
     """A run with a stick; the wall's time is that of the run."""
-    run = steered()
+    run = steered(getattr(request, "param", "move_base"))
     controls = run.controls
     stick = Stick(
         run.session.navigator.server, run.session.clock, controls.take_over, controls.note_end_of_teleoperation
@@ -40,6 +41,37 @@ def test_who_takes_the_stick_cancels_the_goal_and_the_robot_stands_afterwards(by
     assert run.poses[2.5].distance_to(run.poses[4.0]) > 0.2
     assert run.poses[5.0].distance_to(run.poses[6.0]) < 0.01
     assert log(run)[:2] == [("teleoperation", None), ("end of teleoperation", "the stick was released")]
+
+
+@pytest.mark.parametrize("by_hand", ["move_base", "navigation"], indirect=True)
+def test_a_goal_that_was_asked_for_just_before_does_not_drive_the_robot_when_the_stick_is_released(by_hand):
+    run, stick = by_hand
+    run.at(2.0, lambda: run.controls.go_to_pose(Pose.planar(9.0, 8.0)), lambda: stick.hold(1, 0.5, 0.0))
+    hold(run, stick, 2.1, 3.0, turn=0.5)
+    run.at(3.0, lambda: stick.release(1))
+    run.at(6.0, lambda: run.controls.end("enough"))
+
+    run.visit_goals()
+
+    assert len(run.session.recorder.goals) == 2, "the goal had begun"
+    assert run.poses[3.5].distance_to(run.poses[6.0]) < 0.01
+
+
+def test_goals_and_waypoints_of_others_are_refused_while_somebody_drives_and_accepted_afterwards(by_hand):
+    run, stick = by_hand
+    goal = Pose.planar(4.5, 5.0)
+    hold(run, stick, 2.0, 4.0, turn=0.5, forward=0.0)
+    run.at(3.0, lambda: run.controls.go_to_pose(goal))
+    run.at(3.1, lambda: run.controls.add_waypoint(goal), run.controls.drive_waypoints)
+    run.at(4.0, lambda: stick.release(1))
+    run.at(6.0, lambda: run.controls.go_to_pose(goal))
+
+    result = run.visit_goals()
+
+    refused = [event for event in run.events(EventKind.CUSTOM) if event.data["what"] == "refused"]
+    assert [event.data["message"].split(":")[1] for event in refused] == [" somebody drives the robot by hand"] * 2
+    assert run.poses[4.5].distance_to(run.poses[6.0]) < 0.01
+    assert result.success and run.session.recorder.goals[1:] == [goal]
 
 
 def test_a_page_that_falls_silent_has_released_the_stick(by_hand):
