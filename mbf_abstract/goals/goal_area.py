@@ -17,7 +17,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.polygon import inside_polygon
-from mbf_abstract.geometry.tangent_plane import heading_error
+from mbf_abstract.geometry.tangent_plane import SAME_STOREY, heading_error
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 
@@ -74,7 +74,9 @@ class DiscArea(GoalArea):
 
 @dataclass(frozen=True)
 class PolygonArea(GoalArea):
-    """The inside of a simple polygon, seen from above; any height and heading.
+    """The inside of a simple polygon, seen from above, on the storey of its corners; any heading.
+
+    Heights from ``SAME_STOREY`` below the lowest corner to as much above the highest one are on that storey.
 
     Parameters
     ----------
@@ -92,13 +94,17 @@ class PolygonArea(GoalArea):
             raise ValueError("the polygon encloses no area")
 
     def depth(self, pose: Pose) -> float:
-        """Distance [m] from the nearest edge; inside is defined by the even-odd rule."""
+        """Distance [m] from the nearest edge, inside by the even-odd rule; from another storey, to the area in 3D."""
         nearest = math.inf
         for (x1, y1, _), (x2, y2, _) in zip(self.corners, self.corners[1:] + self.corners[:1], strict=True):
             dx, dy, px, py = x2 - x1, y2 - y1, pose.x - x1, pose.y - y1
             share = min(max((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-18), 0.0), 1.0)
             nearest = min(nearest, math.hypot(px - share * dx, py - share * dy))
         inside = inside_polygon(np.array([pose.position]), np.array(self.corners))[0]
+        heights = [z for _, _, z in self.corners]
+        off_storey = max(min(heights) - pose.z, pose.z - max(heights)) - SAME_STOREY
+        if off_storey > 0.0:
+            return -math.hypot(0.0 if inside else nearest, off_storey)
         return nearest if inside else -nearest
 
     def members(self) -> tuple[Pose, ...]:

@@ -98,6 +98,18 @@ def test_a_polygon_may_be_concave(x, y, inside):
     assert PolygonArea(L_SHAPE).contains(Pose.planar(x, y)) is inside
 
 
+@pytest.mark.parametrize(("z", "inside"), [(-3.0, False), (-0.6, False), (-0.4, True), (2.4, True), (2.6, False)])
+def test_a_polygon_lies_on_the_storey_of_its_corners(z, inside):
+    ramp = PolygonArea(((0.0, -2.0, 0.0), (8.0, -2.0, 2.0), (8.0, 2.0, 2.0), (0.0, 2.0, 0.0)))
+    assert ramp.contains(Pose.planar(4.0, 0.0, z=z)) is inside
+    assert not ramp.contains(Pose.planar(4.0, 3.0, z=z))
+
+
+def test_a_robot_outside_a_polygon_on_another_storey_is_as_far_as_it_is_in_3d():
+    assert SQUARE.depth(Pose.planar(3.0, 0.0, z=-3.5)) == pytest.approx(-3.0)
+    assert SQUARE.depth(Pose.planar(8.0, 0.0, z=3.5)) == pytest.approx(-5.0)
+
+
 @settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(-9, 9), st.floats(-9, 9)), min_size=3, max_size=3))
 def test_every_member_of_a_triangle_is_inside_it(points):
