@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+from numbers import Real
 
 from mbf_abstract.drive.robot import Odometry, Robot, odometry_problem
 from mbf_abstract.geometry import Twist
@@ -37,7 +38,7 @@ def check_driver(robot: Robot, clock: Clock) -> None:
         if problem:
             raise DriverError(f"{name} is no robot driver: {method} {problem}")
     radius = getattr(robot, "min_turning_radius", 0.0)
-    if not isinstance(radius, int | float) or not (math.isfinite(radius) and radius >= 0.0):
+    if not isinstance(radius, Real) or not 0.0 <= float(radius) < math.inf:
         raise DriverError(f"{name} is no robot driver: min_turning_radius is {radius!r}, expected a length in m")
     problem = _first_odometry_problem(robot, clock)
     if problem:

@@ -53,6 +53,8 @@ def read_map_header(path: Path) -> MapHeader | None:
         (height_error,) = _numbers(lines, HEIGHT_ERROR) or [0.0]
     except ValueError:
         return None
+    if min(error_rms, error_95, height_error) < 0.0:  # it would widen the limits of layers
+        return None
     crs = [line[len(CRS) :].decode("ascii", "replace").strip() for line in lines if line.startswith(CRS + b" ")]
     return MapHeader((x, y, z), error_rms, error_95, height_error, crs[0] if crs else "")
 

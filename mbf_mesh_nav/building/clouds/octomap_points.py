@@ -56,8 +56,9 @@ def read_octomap_points(path: Path, max_points: int) -> StoredPoints:
         is_binary = path.suffix.lower() == ".bt"
         cubes = _binary_cubes(path, file, header) if is_binary else _full_cubes(path, file, header)
     edges = cubes[:, 3].astype(np.int64)
-    refuse_count(path, int((edges * edges * edges).sum()), max_points)
-    voxels = np.empty((int((edges * edges * edges).sum()), 3), dtype=np.int32)
+    count = int((edges * edges * edges).sum())
+    refuse_count(path, count, max_points)
+    voxels = np.empty((count, 3), dtype=np.int32)
     voxels_of_cubes(cubes, voxels)
     points = (voxels + (0.5 - 2 ** (LEVELS - 1))) * header.voxel
     return StoredPoints(points, notes=(f"{len(points)} occupied voxels of {header.voxel:g} m",))

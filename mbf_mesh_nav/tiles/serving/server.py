@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
+from mbf_abstract.config.bounded_files import configured_file
 from mbf_abstract.config.configuration import Config, PluginSpec
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
@@ -121,7 +122,7 @@ class TileServer(MapServer):
     def serve_maps(self, config: Config) -> Iterator[ServedMap[Any]]:
         """Open the folder."""
         parameters = cast(TiledMapParameters, config.sections["tiled_map"].parameters)
-        folder = config.path.parent / Path(parameters.folder).expanduser()
+        folder = configured_file(config.path.parent, parameters.folder)
         try:
             tiled = TiledMap(folder, parameters.profile, parameters.memory)
         except KeyError as error:

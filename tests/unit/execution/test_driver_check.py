@@ -2,10 +2,11 @@
 
 import threading
 
+import numpy as np
 import pytest
 
 from mbf_abstract.drive.driver_check import DriverError, check_driver
-from mbf_abstract.drive.robot import Odometry
+from mbf_abstract.drive.robot import Odometry, turning_radius_of
 from mbf_abstract.geometry import Twist
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.testing.scripted_session import ScriptedSession
@@ -99,6 +100,14 @@ def test_a_server_with_what_is_no_driver_is_not_made():
     with pytest.raises(DriverError, match="send_command is missing"):
         ScriptedSession(clock=clock, robot=object())
     assert set(clock.thread_names) == {"main"}
+
+
+@pytest.mark.parametrize("radius", [2, np.int64(2), np.float32(2.0), np.float64(2.0)])
+def test_a_driver_may_give_its_tightest_curve_as_any_real_number(radius):
+    robot = Good()
+    robot.min_turning_radius = radius
+    check_driver(robot, SimClock())
+    assert turning_radius_of(robot) == 2.0
 
 
 @pytest.mark.parametrize("answer", [None, Odometry(Twist(), 0.0), OSError("not connected yet")])

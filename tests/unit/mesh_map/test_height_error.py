@@ -1,5 +1,7 @@
 """Limits of layers are narrower by what the errors of a map's heights do to slopes and steps."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -50,6 +52,11 @@ def built(file, **blocks):
     parameters, defaults = default_layers(0.3)
     parameters = parameters.model_copy(update={"mesh_file": file})
     return build_mesh_map(parameters, {name: {**defaults.get(name, {}), **blocks.get(name, {})} for name in LAYERS})
+
+
+def test_a_map_file_with_a_negative_error_states_none(map_file):
+    assert read_map_header(Path(map_file(-0.05))) is None
+    assert read_map_header(Path(map_file(0.05))).height_error == 0.05
 
 
 def test_the_slope_between_two_wrong_heights_is_as_wrong_as_stated():

@@ -243,6 +243,11 @@ def test_what_does_not_fit_the_map_is_refused_at_the_start(tiled_hills, tmp_path
         serve(session, tmp_path, config(tiled_hills, more, block))
 
 
+def test_a_folder_in_a_home_that_is_not_known_is_no_folder_of_tiles(tmp_path):
+    with LoopbackSession(Pose.planar(0.0, 0.0)) as session, pytest.raises(MeshError, match="no such folder of tiles"):
+        serve(session, tmp_path, config("~nobody_of_this_name/map"))
+
+
 def test_planners_for_one_mesh_are_refused_at_the_start(tiled_hills, tmp_path):
     text = config(tiled_hills).replace("tiles.hierarchical", "cvp")
     with LoopbackSession(Pose.planar(0.0, 0.0)) as session, pytest.raises(ServerError, match="needs the whole mesh"):
