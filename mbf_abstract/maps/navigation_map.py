@@ -41,6 +41,8 @@ class NavigationMap(ABC):
     layers: Mapping[str, Any] = MappingProxyType({})
     follows_robot: bool = False
     """Whether an update needs the robot's pose."""
+    knows_outline: bool = False
+    """Whether the robot's outline is checked in its heading, instead of its inscribed circle."""
     floors_taken: int = 0
     """How often an update has taken up a floor that came at run time, see ``take_floor``."""
 

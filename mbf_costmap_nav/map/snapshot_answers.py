@@ -33,6 +33,7 @@ class SnapshotAnswers(LayeredMap):
 
     footprint: Footprint
     unpadded_footprint: Footprint
+    knows_outline = True
 
     @abstractmethod
     def snapshot(self) -> Costmap:

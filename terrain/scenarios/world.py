@@ -74,6 +74,10 @@ class ScenarioWorld:
         """Return what a robot may drive on: the ground, in a building only its free cells."""
         return self.ground if self.grid is None or self.walls is None else free_floor(self.grid)
 
+    def has_wall_at(self, pose: Pose) -> bool:
+        """Whether a pose lies inside a wall of a building; False in other worlds."""
+        return self.walls is not None and self.grid is not None and self.grid.is_occupied(pose.x, pose.y)
+
     def pose_of(self, place: Place) -> Pose:
         """Return the pose on the ground that a place means, upright.
 

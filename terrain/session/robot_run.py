@@ -27,6 +27,7 @@ from terrain.scenarios.world import ScenarioWorld
 from terrain.session.arrival import arrival_tolerance
 from terrain.session.executives import make_executive
 from terrain.session.goal_sequence import NO_GOALS, GoalSequence
+from terrain.session.robot_fit import notes_on_fit
 from terrain.session.run_options import Metrics, Progress, RunOptions, RunResult
 from terrain.session.session import Session
 from terrain.worlds.geodesics import geodesic_length
@@ -77,7 +78,8 @@ class RobotRun:
         )  # fmt: skip
         session.loop.on_tick.append(self._parts.after_step)
         session.loop.on_sample.append(self._report_progress)
-        for note in session.navigator.server.notes:
+        server = session.navigator.server
+        for note in (*server.notes, *notes_on_fit(server, session.scenario.robot)):
             options.on_note(f"note: {note}")
         make = options.outside or (lambda one: make_executive(options.executive, one.navigator))
         self.sequence = GoalSequence(session, make(session), options.stay)

@@ -27,6 +27,7 @@ from terrain.scenarios.places import Place
 from terrain.scenarios.scenario import Scenario, read_scenario, robot_scenarios
 from terrain.scenarios.settings import apply_world_settings
 from terrain.scenarios.world import ScenarioWorld
+from terrain.session.robot_fit import notes_on_fit
 from terrain.session.session import write_navigation_config
 from terrain.urdf_robots.robot_choice import RobotChoice, description_of, notes_on
 from terrain.worlds.generate import flat_terrain
@@ -154,9 +155,12 @@ def _check_places(scenario: Scenario, world: ScenarioWorld, document: YamlDocume
         if place is None:  # read_scenario has reported it
             continue
         try:
-            world.pose_of(place)
+            pose = world.pose_of(place)
         except ConfigError as error:
             findings += [document.finding(key, wrong.expected, wrong.got) for wrong in error.findings]
+            continue
+        if world.has_wall_at(pose):
+            findings.append(document.finding(key, "a place outside the walls", f"({pose.x:g}, {pose.y:g})"))
 
 
 def _check_server(
@@ -175,7 +179,7 @@ def _check_server(
             str(folder): str(source.parent),
         }
         with standing_server(*read_config(file)) as server:
-            return list(server.notes)
+            return [*server.notes, *notes_on_fit(server, robot)]
     return []
 
 

@@ -54,10 +54,17 @@ class OccupancyGrid:
 
     def is_free(self, x: float, y: float) -> bool:
         """Whether the cell at (x, y) [m] is known to be free."""
+        return self._holds(self.free, x, y)
+
+    def is_occupied(self, x: float, y: float) -> bool:
+        """Whether the cell at (x, y) [m] is known to be occupied."""
+        return self._holds(self.occupied, x, y)
+
+    def _holds(self, mask: NDArray[np.bool_], x: float, y: float) -> bool:
         ix = math.floor((x - self.origin_x) / self.resolution)
         iy = math.floor((y - self.origin_y) / self.resolution)
-        ny, nx = self.free.shape
-        return 0 <= ix < nx and 0 <= iy < ny and bool(self.free[iy, ix])
+        ny, nx = mask.shape
+        return 0 <= ix < nx and 0 <= iy < ny and bool(mask[iy, ix])
 
 
 def read_occupancy(path: str | Path) -> OccupancyGrid:

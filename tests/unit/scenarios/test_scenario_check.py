@@ -1,5 +1,7 @@
 """``mbf check`` lists all that is wrong with a scenario at once, and ``mbf run`` the same where it cannot begin."""
 
+import re
+
 import pytest
 import typer
 from hypothesis import example, given, settings
@@ -84,6 +86,47 @@ def test_a_place_off_the_floor_plan_of_a_building_is_a_mistake(place, tmp_path):
     report = check_scenario(load_yaml(write(tmp_path, mistakes)))
     assert found(report, tmp_path) == {("trial.yaml", "start")}
     assert "a place on the ground of the world" in report.findings[0].text
+
+
+def of_both(note):
+    return [f"{costmap}: {note}" for costmap in ("global_costmap", "local_costmap")]
+
+
+def test_a_start_and_a_goal_inside_a_wall_are_mistakes(tmp_path):
+    wall, free = "{x: 0.15, y: 3.0}", "{x: 3.0, y: 3.0}"
+    places = {"world": "{type: office}", "start": wall, "goals": f"[{free}, {wall}]"}
+    mistakes = [("trial.yaml", key, value, "") for key, value in places.items()]
+    report = check_scenario(load_yaml(write(tmp_path, mistakes)))
+    assert found(report, tmp_path) == {("trial.yaml", "start"), ("trial.yaml", "goals[1]")}
+    assert "expected a place outside the walls, got (0.15, 3)" in report.findings[0].text
+
+
+@pytest.mark.parametrize(
+    ("of_mesh", "of_costmaps", "notes"),
+    [
+        ("0.2", "robot_radius: 0.2", ["mesh_map: inscribed 0.20, 0.34", *of_both("inscribed 0.21, 0.34")]),
+        ("0.34", "footprint: [[-0.5, -0.34], [0.5, -0.34], [0.5, 0.34], [-0.5, 0.34]]", []),
+        ("0.34", "robot_radius: 0.36", of_both("circumscribed 0.37, 0.61")),
+        ("0.0", "robot_radius: 0.7", []),
+    ],
+)
+def test_a_footprint_that_does_not_hold_the_robot_is_noted(of_mesh, of_costmaps, notes, tmp_path):
+    changes = [
+        ("trial.yaml", "robot", "husky", ""),
+        ("mesh.yaml", "mesh_map", f"{{mesh_file: $WORLD_MESH, layers: [], inscribed_radius: {of_mesh}}}", ""),
+        *(
+            ("costmap.yaml", key, COSTMAP[key].replace("robot_radius: 0.2", of_costmaps), "")
+            for key in ("global_costmap", "local_costmap")
+        ),
+    ]
+    report = check_scenario(load_yaml(write(tmp_path, changes)))
+
+    assert not report.findings
+    pattern = (
+        r"(\w+): the footprint does not hold the robot 'husky': its (\w+) radius is (.*) m, that of the robot (.*) m"
+    )
+    said = [match.groups() for note in report.notes if (match := re.search(pattern, note))]
+    assert [f"{name}: {radius} {own}, {of_robot}" for name, radius, own, of_robot in said] == notes
 
 
 @pytest.mark.parametrize("size", ["[0.6, -0.8, 0.6]", "[0.0, 0.5, 1.0]"])
