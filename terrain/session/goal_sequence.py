@@ -78,13 +78,14 @@ class GoalSequence:
         self._next: AskedGoal | AskedWaypoints | None = None
         self._following: AnyGoalHandle | None = None
         self._end: MoveBaseResult | None = None
-        self._deadline = float("inf")
+        self._limit = self._deadline = float("inf")
         session.loop.on_tick.append(self._watch)
         session.loop.on_failure.append(lambda: self.end("the simulation has failed"))
 
     def visit_goals(self) -> MoveBaseResult:
         """Visit the goals of the scenario, and others if they come; returns the result of the last one."""
-        self._deadline = limit = self._session.scenario.time_limit
+        limit = self._session.scenario.time_limit
+        self._allow(limit, since=0.0)
         result = NO_GOALS
         for goal in self._session.goals:
             if self._next is not None or self._end is not None:
@@ -96,11 +97,11 @@ class GoalSequence:
             self.last_result = result = self._end
         while (asked := self._await_goal()) is not None:
             if isinstance(asked, AskedWaypoints):
-                self._deadline = self._session.simulation.time + limit * asked.loops * len(asked.poses)
+                self._allow(limit * asked.loops * len(asked.poses), self._session.simulation.time)
                 result = self._follow(asked)
                 continue
             self._announce(asked.pose)
-            self._deadline = self._session.simulation.time + limit
+            self._allow(limit, self._session.simulation.time)
             result = self._visit(asked)
         return result
 
@@ -126,6 +127,10 @@ class GoalSequence:
         self.cancel(reason)
 
     # -------------------------------------------------------------------------------------------------
+    def _allow(self, seconds: float, since: float) -> None:
+        """Cancel what drives then, that long [s] after a time [s]."""
+        self._limit, self._deadline = seconds, since + seconds
+
     def _visit(self, goal: AskedGoal) -> MoveBaseResult:
         self.target = goal.pose
         self.last_result = result = self._executive.drive(goal.pose, goal.planner, goal.controller)
@@ -188,4 +193,4 @@ class GoalSequence:
             self.cancel(REPLACED)
         if time >= self._deadline:
             self._deadline = float("inf")
-            self.cancel(f"the time limit of {self._session.scenario.time_limit:g} s")
+            self.cancel(f"the time limit of {self._limit:g} s")

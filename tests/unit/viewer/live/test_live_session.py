@@ -75,6 +75,18 @@ def test_a_page_that_breaks_down_is_reported_once_and_the_run_goes_on(meadow):
         assert len(faults) == 1
 
 
+def test_a_stick_that_is_held_when_the_run_ends_is_let_go(meadow):
+    with Session(meadow) as session:
+        sequence = GoalSequence(session, make_executive("move_base", session.navigator), stay=True)
+        with LiveSession(session, sequence, ViewOptions(port=18230, speed=0.0)) as live:
+            session.loop.on_tick.insert(0, lambda time: live._stick.hold(1, 0.5, 0.0))
+            session.loop.on_tick.append(lambda time: sequence.end("done") if time > 2.0 else None)
+            sequence.visit_goals()
+        reasons = [event.data.get("reason") for event in session.memory.of_kind(EventKind.CUSTOM)]
+        assert reasons[-1] == "the run has ended"
+        assert session.navigator.server.runtime.gate.holder == ""
+
+
 def test_an_interface_that_does_not_exist_is_reported_in_one_line(meadow, tmp_path):
     with pytest.raises(ViewerMissing, match=r"203\.0\.113\.1"):
         run(meadow, tmp_path, watch=page(host="203.0.113.1"))

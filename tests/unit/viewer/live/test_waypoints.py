@@ -52,6 +52,18 @@ def test_waypoints_that_are_canceled_leave_the_robot_standing(steered, executive
     assert len(run.session.recorder.goals) == 2, "the second waypoint was never begun"
 
 
+def test_waypoints_have_the_scenarios_time_limit_each_and_the_message_has_that_of_all(steered, meadow):
+    run = steered()
+    run.session.scenario = meadow.model_copy(update={"time_limit": 1.0})
+    run.at(2.0, lambda: place(run, (8.0, 8.0), (8.0, 2.0)), run.controls.drive_waypoints)
+
+    result = run.visit_goals()
+
+    (canceled,) = run.events(EventKind.GOAL_CANCEL, source="follow_waypoints")
+    assert round(canceled.time) == 4
+    assert result.outcome_name == "CANCELED" and result.message == "the time limit of 2 s"
+
+
 def test_a_goal_replaces_waypoints_and_the_list_stays(steered):
     run = steered()
     run.at(1.0, lambda: place(run, (8.0, 8.0)), run.controls.drive_waypoints)
