@@ -67,6 +67,7 @@ class ServedMap(Generic[Map]):
         self._runtime = runtime
         self.transform_tolerance = transform_tolerance
         self._motions = MotionChanges()
+        self._floors = navigation_map.floors_taken  # that have been reported
         self._lock = threading.Lock()
         self._users, self._running, self._idle_since = 0, False, runtime.clock.now()
         if not runtime.parameters.shutdown_costmaps:
@@ -94,9 +95,9 @@ class ServedMap(Generic[Map]):
                 pose = self._runtime.transforms.transform_pose(self._runtime.robot.pose(), self.map.frame_id)
             except (RobotStateError, TransformError):
                 pose = None
-        floors = self.map.floors_taken
         self.map.update(pose, self._runtime.clock.now())
-        if self.map.floors_taken != floors:
+        if (taken := self.map.floors_taken) != self._floors:  # once, of several updates that have waited for each other
+            self._floors = taken
             self._report_floor()
         for event in self._motions.changes(self.tracked_objects()):
             self._runtime.events.emit(EventKind.OBJECT, self.name, **event)

@@ -11,7 +11,7 @@ from mbf_abstract.testing.scripted_session import ScriptedSession
 class CountedMap:
     """A map that counts what is done to it."""
 
-    frame_id, follows_robot, layers = "map", False, MappingProxyType({})
+    frame_id, follows_robot, layers, floors_taken = "map", False, MappingProxyType({}), 0
 
     def __init__(self):
         self.updates, self.cleared = [], 0

@@ -301,6 +301,17 @@ def test_a_map_that_says_nothing_new_changes_nothing(site):
     assert len(site.seen.of_kind(EventKind.PLAN)) == 1
 
 
+def test_a_new_map_is_reported_once_whichever_update_takes_it_up(site):
+    served, now = site.server.served["global_costmap"], site.server.runtime.clock.now()
+    site.server.take_floor("/map", floor())
+    served.map.update(None, now)  # as another thread does while ours waits for the lock
+    for _ in range(2):
+        served.update()
+    assert [one.data["message"] for one in site.seen.of_kind(EventKind.MAP)].count(
+        "global_costmap: a new floor has come"
+    ) == 1
+
+
 def test_a_goal_behind_walls_of_a_topic_is_not_unreachable_for_ever(site):
     come(site, floor(wall=lambda ys: ys < 9.0))
     planned = site.get_path(Pose.planar(3.0, 0.0))
