@@ -8,9 +8,11 @@ import pytest
 
 from mbf_abstract.compiling.kernel_cache import compile_lazily
 from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import Twist
 from mbf_abstract.maps.tracking import avoidance
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
+from mbf_abstract.plugins import ControlResult
 from mbf_abstract.testing.conformance.rig import ROBOT_RADIUS, Box
 from mbf_abstract.testing.conformance.site import site
 from mbf_abstract.time.clock import Priority
@@ -150,6 +152,26 @@ def test_the_robot_stands_when_somebody_runs_into_it(make_map_server):
     with site(make_map_server, **PARAMETERS) as made:
         walker, _ = drive(made, (7.5, 4.0), (-0.7, 0.0))
         assert walker.touched_by == "walker"
+
+
+def test_a_robot_whose_turns_cancel_out_does_not_drive_straight_into_somebody(make_map_server):
+    """Each command alone leads aside on a tiny circle; the robot is too heavy to turn so fast and goes straight on."""
+    with site(make_map_server, **PARAMETERS) as made:
+        walker, robot = Walker(made.rig, 7.0, 4.0, -0.3, 0.0), made.rig.robot
+        velocity, turn, shares = Twist(), 4.0, []
+        while not walker.touched_by and made.rig.clock.now() < 15.0:
+            turn = -turn
+            wanted = ControlResult(ExePathOutcome.SUCCESS, "", Twist.planar(0.9, 0.0, turn))
+            command = made.server.avoid_contact(robot.pose, velocity, wanted).command or Twist()
+            shares.append(command.vx / 0.9)
+            velocity = Twist.planar(
+                velocity.vx + max(-0.5 * STEP, min(0.5 * STEP, command.vx - velocity.vx)),
+                0.0,
+                velocity.wz + max(-1.0 * STEP, min(1.0 * STEP, command.wz - velocity.wz)),
+            )
+            robot.send_command(velocity)
+            made.rig.clock.sleep(STEP)
+        assert shares[0] == 1.0 and walker.touched_by == "walker"
 
 
 def test_a_recovery_touches_nobody_either(make_map_server):

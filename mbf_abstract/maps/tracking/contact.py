@@ -2,9 +2,9 @@
 
 The rule is passive motion safety (Macek, Vasquez, Fraichard, Siegwart 2009): a motion is safe if the robot can stand
 before any contact. Contacts that happen while it stands are not its fault. So a command is followed for a reaction
-time, then the robot brakes; objects keep their velocities until it stands, or turn now. A turn is noticed after
-``turning_time``; until then the object may be wherever it gets at its speed. While somebody who moves is nearer than
-the margin, or touches it, the robot stands.
+time, then the robot brakes (``braking.py``); objects keep their velocities until it stands, or turn now. A turn is
+noticed after ``turning_time``; until then the object may be wherever it gets at its speed. While somebody who moves is
+nearer than the margin, or touches it, the robot stands.
 """
 
 from __future__ import annotations
@@ -16,14 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
-from mbf_abstract.geometry.arcs import poses_on_arc
+from mbf_abstract.maps.tracking.braking import Decelerations, motions_to_standstill
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.parameters import ParameterModel, parameter
 
 SHARES = (1.0, 0.75, 0.5, 0.25)
 """Shares of a command that are tried, in this order, before the robot stops."""
-STEP = 0.1
-"""Time [s] between two looks at robot and objects."""
 CORNERS = 16
 """Of the outline of a round robot."""
 SAME_STOREY = 1.0
@@ -149,36 +147,18 @@ def _first_contact(
     objects: Sequence[TrackedObject],
     limits: ContactParameters,
 ) -> TrackedObject | None:
-    """What the robot would touch before it stands."""
-    times, driven = _braking(velocity, command, share, limits)
-    start = pose.x, pose.y, pose.yaw
-    moving = poses_on_arc(start, command.vx, command.vy, command.wz, driven)
+    """What the robot would touch before it stands, on the first of its motions on which it touches something."""
     middles = np.array([(known.x, known.y) for known in objects])
     velocities = np.array([(known.vx, known.vy) for known in objects])
-    places = middles[None] + times[:, None, None] * velocities[None]
+    speeds = np.array([known.speed for known in objects])
     radii = np.array([known.radius for known in objects]) + limits.contact_margin
-    contact = box.gaps(moving, places, radii) < 0.0
-    if limits.turning_time > 0.0:
-        ways = np.minimum(times, limits.turning_time)[:, None] * np.array([known.speed for known in objects])
-        contact |= box.gaps(moving, np.broadcast_to(middles, places.shape), radii + ways) < 0.0
-    if not contact.any():
-        return None
-    return objects[int(np.argmax(contact[int(np.argmax(contact.any(axis=1)))]))]
-
-
-def _braking(velocity: Twist, command: Twist, share: float, limits: ContactParameters) -> tuple[FloatArray, FloatArray]:
-    """Times (n,) [s] until the robot stands, and the motion by then as a time (n,) [s] of following the whole command.
-
-    The pace is the motion as a share of the command, first that of the measured velocity.
-    """
-    if command.speed > 0.0:
-        now, slowing = velocity.speed / command.speed, limits.decel_lim_x / command.speed
-    else:
-        now, slowing = abs(velocity.wz / command.wz), limits.decel_lim_theta / abs(command.wz)
-    react = limits.reaction_time
-    pace = max(share, now - slowing * react)
-    end = react + pace / slowing
-    times = np.linspace(0.0, end, math.ceil(end / STEP) + 1)[1:]
-    braked = np.maximum(times - react, 0.0)
-    before = np.minimum(times, react) * max(share, 0.5 * (now + pace))
-    return times, before + braked * (pace - 0.5 * slowing * braked)
+    braking = Decelerations(limits.decel_lim_x, limits.decel_lim_theta, limits.reaction_time)
+    for times, poses in motions_to_standstill(pose, velocity, command, share, braking):
+        places = middles[None] + times[:, None, None] * velocities[None]
+        contact = box.gaps(poses, places, radii) < 0.0
+        if limits.turning_time > 0.0:
+            ways = np.minimum(times, limits.turning_time)[:, None] * speeds
+            contact |= box.gaps(poses, np.broadcast_to(middles, places.shape), radii + ways) < 0.0
+        if contact.any():
+            return objects[int(np.argmax(contact[int(np.argmax(contact.any(axis=1)))]))]
+    return None
