@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, refuse_count
+from mbf_mesh_nav.building.clouds.stored_points import LONGEST_CRS, StoredPoints, refuse_count
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 PACKAGES = {".las": ("laspy",), ".laz": ("laspy", "lazrs")}
@@ -98,7 +98,8 @@ def _crs(text: str, keys: dict[int, int]) -> str:
     if 0 < number != USER_DEFINED:
         return f"EPSG:{number}"
     name = SYSTEM_NAME.search(text)
-    return "" if name is None else " ".join(name.group(1).encode("ascii", "replace").decode().split())
+    words = " ".join(name.group(1).split()) if name is not None else ""
+    return "".join(one if one.isascii() and one.isprintable() else "?" for one in words[:LONGEST_CRS])
 
 
 def _unit(path: Path, text: str, keys: dict[int, int]) -> float:

@@ -20,7 +20,7 @@ from mbf_mesh_nav.building.clouds.octomap_points import read_octomap_points
 from mbf_mesh_nav.building.clouds.pcd_points import read_pcd_points
 from mbf_mesh_nav.building.clouds.ply_points import has_faces, read_ply_points
 from mbf_mesh_nav.building.clouds.run_points import read_run_points
-from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, refuse_count
+from mbf_mesh_nav.building.clouds.stored_points import LONGEST_CRS, StoredPoints, refuse_count
 from mbf_mesh_nav.building.clouds.text_points import read_text_points
 from mbf_mesh_nav.files.elevation_files import elevation_readers
 from mbf_mesh_nav.files.file_frames import FileFrame, on_the_map
@@ -39,7 +39,6 @@ READERS: dict[str, Reader] = {
 """Readers by the ending of the file."""
 MAX_POINTS = 50_000_000
 """Points of all files together unless the caller asks for more; each takes some hundred bytes while a map is built."""
-LONGEST_CRS = 200
 FAR = 10_000.0
 """Coordinates [m] beyond this are of a grid of a country: the map gets an origin of its own."""
 ORIGIN_STEP = 100.0

@@ -217,6 +217,7 @@ def test_files_of_different_units_are_refused(tmp_path):
     [
         ('PROJCS["a grid",UNIT["metre",1],AUTHORITY["EPSG","25832"]]', "EPSG:25832"),
         ('PROJCS["a  grid of Ö",GEOGCS["b",AUTHORITY["EPSG","4258"]],UNIT["metre",1]]', "a grid of ?"),
+        pytest.param(f'PROJCS["a\x1b[31m{"g" * 60_000}",UNIT["metre",1]]', "a?[31m" + "g" * 194, id="long"),
         ("", ""),
     ],
 )
