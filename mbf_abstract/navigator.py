@@ -31,6 +31,7 @@ from mbf_abstract.goals.goal_types import (
     FollowWaypointsResult,
     GetPathGoal,
     GetPathResult,
+    MoveBaseFeedback,
     MoveBaseGoal,
     MoveBaseResult,
     NoFeedback,
@@ -74,7 +75,7 @@ class Navigator:
     @overload
     def send(self, goal: RefinePathGoal) -> GoalHandle[RefinePathGoal, RefinePathResult, NoFeedback]: ...
     @overload
-    def send(self, goal: MoveBaseGoal) -> GoalHandle[MoveBaseGoal, MoveBaseResult, ExePathFeedback]: ...
+    def send(self, goal: MoveBaseGoal) -> GoalHandle[MoveBaseGoal, MoveBaseResult, MoveBaseFeedback]: ...
     @overload
     def send(
         self, goal: FollowWaypointsGoal

@@ -21,6 +21,7 @@ from mbf_abstract.goals.goal_types import (
     FollowWaypointsFeedback,
     FollowWaypointsGoal,
     FollowWaypointsResult,
+    MoveBaseFeedback,
     MoveBaseGoal,
     MoveBaseResult,
     WaypointTask,
@@ -31,7 +32,7 @@ from mbf_abstract.time.clock import ThreadDetached
 
 Handle = GoalHandle[FollowWaypointsGoal, FollowWaypointsResult, FollowWaypointsFeedback]
 Job = GoalJob[FollowWaypointsGoal, FollowWaypointsResult, FollowWaypointsFeedback]
-Drive = GoalHandle[MoveBaseGoal, MoveBaseResult, ExePathFeedback]
+Drive = GoalHandle[MoveBaseGoal, MoveBaseResult, MoveBaseFeedback]
 
 
 class FollowWaypointsAction(Action[FollowWaypointsGoal, FollowWaypointsResult, FollowWaypointsFeedback]):

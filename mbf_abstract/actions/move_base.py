@@ -14,6 +14,7 @@ path followed           succeeded
 following failed        INVALID_PATH .. INTERNAL_ERROR end the goal, any other code: recover (trigger *control*)
 robot oscillates        stop, recover (trigger *oscillation*), else end with OSCILLATION
 recovery over           plan again, whatever its outcome
+via pose passed         it is dropped; plans from now on lead through those left (``actions.via_poses``)
 new goal                takes over: the old one ends CANCELED, the robot drives on until the new plan is there
 cancel                  cancel the sub-goals, wait for their ends, end CANCELED
 ======================  =====================================================================================
@@ -35,7 +36,7 @@ from mbf_abstract.actions.action import Action, GoalJob
 from mbf_abstract.actions.exe_path import ExePathAction
 from mbf_abstract.actions.get_path import GetPathAction
 from mbf_abstract.actions.meetings import behavior_for_meetings
-from mbf_abstract.actions.move_base_machine import MoveBaseMachine, SubActions
+from mbf_abstract.actions.move_base_machine import MoveBaseMachine, SubActions, via_of
 from mbf_abstract.actions.recovery import RecoveryAction
 from mbf_abstract.actions.refine_path import RefinePathAction
 from mbf_abstract.drive.robot import RobotStateError
@@ -43,17 +44,17 @@ from mbf_abstract.execution.plan_check import arrival_problem, in_global_frame
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.goals.goal_types import ExePathFeedback, MoveBaseGoal, MoveBaseResult
+from mbf_abstract.goals.goal_types import MoveBaseFeedback, MoveBaseGoal, MoveBaseResult
 from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.outcomes import MoveBaseOutcome
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.plugin_table import PluginTable
 
-Handle = GoalHandle[MoveBaseGoal, MoveBaseResult, ExePathFeedback]
-Job = GoalJob[MoveBaseGoal, MoveBaseResult, ExePathFeedback]
+Handle = GoalHandle[MoveBaseGoal, MoveBaseResult, MoveBaseFeedback]
+Job = GoalJob[MoveBaseGoal, MoveBaseResult, MoveBaseFeedback]
 
 
-class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
+class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, MoveBaseFeedback]):
     """Goes to poses."""
 
     name = "move_base"
@@ -88,6 +89,8 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
             if problem:
                 return MoveBaseOutcome.FAILURE, problem
         problem = arrival_problem(goal, self.runtime)
+        if goal.via and goal.goal_area is not None:
+            problem = problem or "via poses lead to a target pose, not to a goal area; give one of the two"
         return (MoveBaseOutcome.FAILURE, problem) if problem else None
 
     def execute(self, job: Job) -> MoveBaseResult:
@@ -95,10 +98,10 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
         job.report_started()
         try:
             self.runtime.robot.pose()
-            target = self._target(job.handle)
+            target, via = self._target(job.handle), via_of(job.handle.goal, self.runtime)
         except (RobotStateError, TransformError) as error:
             return self.make_result(job.handle, MoveBaseOutcome.TF_ERROR, str(error))
-        machine = MoveBaseMachine(self._sub_actions, self._plugins, job, target)
+        machine = MoveBaseMachine(self._sub_actions, self._plugins, job, target, via)
         with job.open_to_take_over(lambda goal: True, machine.wake):
             outcome, message = machine.run()
         return self.make_result(job.handle, outcome, message)

@@ -12,9 +12,11 @@ from mbf_abstract.actions.move_base_states import MoveBaseState, Trigger
 from mbf_abstract.actions.recovery import RecoveryAction
 from mbf_abstract.actions.recovery_sequence import RecoverySequence
 from mbf_abstract.actions.refine_path import RefinePathAction
+from mbf_abstract.actions.via_poses import ViaPoses
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.motion_watch import OscillationDetector
 from mbf_abstract.execution.plan_check import in_global_frame
+from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import (
@@ -22,6 +24,7 @@ from mbf_abstract.goals.goal_types import (
     ExePathGoal,
     GetPathGoal,
     GetPathResult,
+    MoveBaseFeedback,
     MoveBaseGoal,
     MoveBaseResult,
     RecoveryGoal,
@@ -38,7 +41,7 @@ NO_REPLAN_WITHIN = 0.1  # m from the goal
 LEAST_SHARE_LEFT = 0.25  # of the tolerance, for stopping at the end of a path that does not reach the target
 FATAL = range(ExePathOutcome.INVALID_PATH, ExePathOutcome.INTERNAL_ERROR + 1)
 
-Job = GoalJob[MoveBaseGoal, MoveBaseResult, ExePathFeedback]
+Job = GoalJob[MoveBaseGoal, MoveBaseResult, MoveBaseFeedback]
 End = tuple[int, str]
 
 
@@ -51,14 +54,19 @@ class SubActions(NamedTuple):
     refine_path: RefinePathAction
 
 
+def via_of(goal: MoveBaseGoal, runtime: Runtime) -> ViaPoses:
+    """Via poses of a goal in the global frame; raises TransformError."""
+    return ViaPoses([in_global_frame(pose, runtime) for pose in goal.via])
+
+
 class MoveBaseMachine:
     """One run of move_base, for one goal or several that take over from each other."""
 
-    def __init__(self, sub_actions: SubActions, plugins: PluginTable, job: Job, target: Pose) -> None:
+    def __init__(self, sub_actions: SubActions, plugins: PluginTable, job: Job, target: Pose, via: ViaPoses) -> None:
         self._sub_actions = sub_actions
         self._runtime = job.action.runtime
         self._job = job
-        self._target = target
+        self._target, self._via = target, via
         self._state = MoveBaseState.GET_PATH
         self._plan: AnyGoalHandle | None = None
         self._follow: AnyGoalHandle | None = None
@@ -153,6 +161,7 @@ class MoveBaseMachine:
                 dist_tolerance=goal.dist_tolerance,
                 angle_tolerance=goal.angle_tolerance,
                 goal_area=goal.goal_area,
+                via=self._via.plan(),
                 concurrency_slot=SUB_GOAL_SLOT,
             ),
         )
@@ -171,7 +180,7 @@ class MoveBaseMachine:
                 self._follow_path(result.path)
             return None
         if self._follow is None:
-            failure = (result.outcome, result.message)
+            failure = (result.outcome, self._via.described(result.message))
             return failure if result.permanent else self._recover_from(Trigger.PLAN, failure)
         return self._on_replan_failed(result)
 
@@ -181,7 +190,7 @@ class MoveBaseMachine:
         outdated = taken_over or self._followed_floor != self._planned_floor  # or over an old floor
         if policy == "keep" and not outdated:
             return None
-        failure = (result.outcome, f"replanning failed: {result.message}")
+        failure = (result.outcome, f"replanning failed: {self._via.described(result.message)}")
         if (policy == "stop" and not taken_over) or (result.permanent and outdated):
             return self._end_after_stop(failure)
         self._stop_then_recover(Trigger.PLAN, failure)
@@ -203,7 +212,7 @@ class MoveBaseMachine:
         return max(0.0, 1.0 / frequency - self._replan_watch.elapsed)
 
     def _distance_to_goal(self) -> float:
-        feedback = self._follow.feedback if self._follow is not None else None
+        feedback = self._follow.feedback if self._follow is not None and not self._via.left else None
         return feedback.dist_to_goal if feedback is not None else float("inf")
 
     # ------------------------------------------------------------------------------------- following
@@ -212,6 +221,7 @@ class MoveBaseMachine:
         if self._follow is None:
             self._oscillation.reset()
             self._replan_watch.restart()
+        self._via.follow(path)
         self._followed_floor = self._planned_floor
         self._enter(MoveBaseState.EXE_PATH)
         self._follow = self._send(
@@ -229,16 +239,23 @@ class MoveBaseMachine:
     def _arrival_tolerance(self, path: Path) -> float | None:
         """What a path that ends off the target leaves of the tolerance [m]; None = the server's."""
         goal, off = self._job.handle.goal, path[-1].distance_to(self._target)
-        tolerance = self._runtime.parameters.dist_tolerance if goal.dist_tolerance is None else goal.dist_tolerance
+        tolerance = self._dist_tolerance
         if goal.goal_area is not None or off == 0.0 or tolerance == 0.0:
             return goal.dist_tolerance
         return max(tolerance - off, LEAST_SHARE_LEFT * tolerance)
+
+    @property
+    def _dist_tolerance(self) -> float:
+        """Arrival tolerance [m] of the goal, else the server's."""
+        given = self._job.handle.goal.dist_tolerance
+        return self._runtime.parameters.dist_tolerance if given is None else given
 
     def _on_feedback(self, message: AnyGoalHandle) -> End | None:
         if message is not self._follow or message.feedback is None or self._state is not MoveBaseState.EXE_PATH:
             return None
         feedback: ExePathFeedback = message.feedback
-        self._job.handle.publish_feedback(feedback)
+        self._via.note_progress(feedback.distance_along_path, self._dist_tolerance)
+        self._job.handle.publish_feedback(MoveBaseFeedback(**vars(feedback), via_left=len(self._via.left)))
         parameters, pose = self._runtime.parameters, feedback.current_pose
         self._recoveries.note_motion(pose)
         if self._oscillation.check(
@@ -290,7 +307,8 @@ class MoveBaseMachine:
         self._failure = None
         self._oscillation.reset()
         try:
-            self._target = in_global_frame(self._job.handle.goal.target_pose, self._runtime)
+            goal = self._job.handle.goal
+            self._target, self._via = in_global_frame(goal.target_pose, self._runtime), via_of(goal, self._runtime)
         except TransformError as error:
             self._end_after_stop((MoveBaseOutcome.TF_ERROR, str(error)))
             return

@@ -102,6 +102,9 @@ class MoveBaseGoal:
         from it too; the robot then comes the nearer to the path's end, at least to a quarter of the tolerance.
     goal_area : GoalArea, optional
         Go to the cheapest place inside instead of to ``target_pose``, and stop as soon as inside.
+    via : tuple of Pose
+        Poses to pass on the way to the target, in order and without a stop, each to within the arrival tolerance along
+        the path. TypeError where one is no pose; not together with a ``goal_area``.
     """
 
     target_pose: Pose
@@ -111,6 +114,13 @@ class MoveBaseGoal:
     dist_tolerance: float | None = None
     angle_tolerance: float | None = None
     goal_area: GoalArea | None = None
+    via: tuple[Pose, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "via", tuple(self.via))
+        for index, pose in enumerate(self.via):
+            if not isinstance(pose, Pose):
+                raise TypeError(f"via[{index}] must be a Pose, got {type(pose).__name__}")
 
 
 @dataclass(frozen=True)
@@ -286,6 +296,19 @@ class ExePathFeedback:
     distance_along_path: float
     time_to_goal: float
     last_command: Command | None = None
+
+
+@dataclass(frozen=True)
+class MoveBaseFeedback(ExePathFeedback):
+    """The same of a robot on its way to a pose, whose path leads through all via poses that are left.
+
+    Attributes
+    ----------
+    via_left : int
+        How many via poses the robot has not passed yet.
+    """
+
+    via_left: int = 0
 
 
 @dataclass(frozen=True)

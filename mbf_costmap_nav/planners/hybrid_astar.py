@@ -82,12 +82,13 @@ class HybridAStarPlanner(CostmapPlanner):
         for number, (start, goal) in enumerate(pairwise((request.start, *request.via, request.goal))):
             is_last = number == len(request.via)
             tolerance = request.dist_tolerance if is_last else 0.0
-            failure = failure or _misfit(world, "goal" if is_last else f"via pose {number}", goal, tolerance)
+            name = "goal" if is_last else f"via pose {number + 1}"
+            failure = failure or _misfit(world, name, goal, tolerance)
             leg = None if failure or request.cancel_token.cancelled else self._search(world, start, goal, tolerance)
             if request.cancel_token.cancelled:
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if leg is None or len(leg.poses) == 0:
-                failure = failure or self._no_path(world, start, goal, leg, tolerance)
+                failure = failure or self._no_path(world, start, goal, leg, tolerance, name)
                 return marked_if_permanent(failure, self.costmap, start, goal, tolerance)
             legs.append(leg)
         poses = np.concatenate([legs[0].poses, *(leg.poses[1:] for leg in legs[1:])])
@@ -129,9 +130,11 @@ class HybridAStarPlanner(CostmapPlanner):
             max_states=p.max_states,
         )
 
-    def _no_path(self, world: CarWorld, start: Pose, goal: Pose, leg: CarLeg | None, tolerance: float) -> PlanResult:
+    def _no_path(
+        self, world: CarWorld, start: Pose, goal: Pose, leg: CarLeg | None, tolerance: float, name: str
+    ) -> PlanResult:
         """Failure with its cause: the goal is walled off, the car cannot get there, or the search gave up."""
-        ends = f"from ({start.x:.2f}, {start.y:.2f}) to ({goal.x:.2f}, {goal.y:.2f})"
+        ends = f"from ({start.x:.2f}, {start.y:.2f}) to the {name} ({goal.x:.2f}, {goal.y:.2f})"
         if leg is None and not world.fits(goal):
             text = f"the robot does not fit at the goal ({goal.x:.2f}, {goal.y:.2f}, {goal.yaw:.2f} rad)"
             text += f", and no place within {tolerance:.2f} m of it can be reached"

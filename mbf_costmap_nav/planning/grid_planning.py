@@ -141,7 +141,7 @@ class GridPlanner(CostmapPlanner):
         for number, (start, goal) in enumerate(pairwise(poses)):
             is_last = number == len(poses) - 2
             tolerance = request.dist_tolerance if is_last else 0.0
-            name = "goal" if is_last else f"via pose {number}"
+            name = "goal" if is_last else f"via pose {number + 1}"
             failure = failure or _check_goal(grid, goal, tolerance, name)
             leg = NO_LEG if failure or request.cancel_token.cancelled else self.search(grid, start, goal, tolerance)
             if request.cancel_token.cancelled:

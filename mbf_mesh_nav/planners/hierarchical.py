@@ -27,7 +27,7 @@ from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner, position_text
 from mbf_mesh_nav.mesh.topology import group_of_each
 from mbf_mesh_nav.search.leg_search import Leg
-from mbf_mesh_nav.search.surface_planner import named_poses, path_of_legs
+from mbf_mesh_nav.search.surface_planner import failure_of_leg, named_poses, path_of_legs
 from mbf_mesh_nav.tiles.corridor_search import TiledPlan
 from mbf_mesh_nav.tiles.places import TilePlace
 from mbf_mesh_nav.tiles.planning import SURFACE_DISTANCE, TOLERANCE, place_on_tiles, plan_between
@@ -88,7 +88,7 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         for first, last in itertools.pairwise(places):
             plan = self._plan(first, last, flag)
             if plan.outcome != GetPathOutcome.SUCCESS:
-                problem = self._failed(plan)
+                problem = failure_of_leg(self._failed(plan), len(plans), request)
                 break
             plans.append(plan)
         near_goal = problem is not None and len(plans) == len(request.via) and request.dist_tolerance > 0.0

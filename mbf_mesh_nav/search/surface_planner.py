@@ -91,7 +91,7 @@ class SurfacePlanner(MeshPlanner):
             tolerance = request.angle_tolerance if index == len(request.via) else 0.0
             leg = self.find_leg(LegQuery(start, goal, snapshot, blocked, request.cancel_token.flag, *ends, tolerance))
             if leg is None:
-                problem = self._no_path(start, goal, blocked)
+                problem = failure_of_leg(self._no_path(start, goal, blocked), index, request)
                 break
             legs.append(leg)
         near_goal = problem is not None and len(legs) == len(request.via) and request.dist_tolerance > 0.0
@@ -119,7 +119,7 @@ class SurfacePlanner(MeshPlanner):
             point = self._locate(name, pose, snapshot, blocked)
             if isinstance(point, PlanResult):
                 return stops, point
-            problem = self._different_components(stops[0], point) if stops else None
+            problem = self._different_components(stops[0], point, name) if stops else None
             if problem is not None:
                 return stops, problem
             stops.append(point)
@@ -143,7 +143,7 @@ class SurfacePlanner(MeshPlanner):
             return PlanResult(outcome, f"the {name} {position_text(pose.position)} is blocked: {reason}")
         return point
 
-    def _different_components(self, start: SurfacePoint, stop: SurfacePoint) -> PlanResult | None:
+    def _different_components(self, start: SurfacePoint, stop: SurfacePoint, name: str) -> PlanResult | None:
         """NO_PATH_FOUND if two points lie on surfaces that do not touch; known without a search."""
         components = self.mesh_map.components
         home, other = (components[self.mesh_map.faces[point.face, 0]] for point in (start, stop))
@@ -151,8 +151,8 @@ class SurfacePlanner(MeshPlanner):
             return None
         sizes = [int(np.count_nonzero(components == label)) for label in (home, other)]
         message = (
-            f"the start is on component {home} ({sizes[0]} vertices), {position_text(stop.point)} on component "
-            f"{other} ({sizes[1]} vertices); they do not touch"
+            f"the start is on component {home} ({sizes[0]} vertices), the {name} {position_text(stop.point)} on "
+            f"component {other} ({sizes[1]} vertices); they do not touch"
         )
         return PlanResult(GetPathOutcome.NO_PATH_FOUND, message, permanent=True)
 
@@ -204,5 +204,12 @@ def path_of_legs(legs: Sequence[Leg], goal: Pose, ends_there: bool, frame_id: st
 
 def named_poses(request: PlanRequest) -> list[tuple[str, Pose]]:
     """All poses of a request with what they are called in messages."""
-    via = [(f"via point {index}", pose) for index, pose in enumerate(request.via)]
+    via = [(f"via pose {number}", pose) for number, pose in enumerate(request.via, 1)]
     return [("start", request.start), *via, ("goal", request.goal)]
+
+
+def failure_of_leg(problem: PlanResult, index: int, request: PlanRequest) -> PlanResult:
+    """Return the failure of one leg of a request; that of a leg to a via pose names the pose."""
+    if index == len(request.via):
+        return problem
+    return replace(problem, message=f"via pose {index + 1}: {problem.message}")

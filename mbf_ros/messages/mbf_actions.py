@@ -195,7 +195,7 @@ def recovery_result_of(message: Message, context: MessageContext) -> RecoveryRes
 def move_base_goal(goal: MoveBaseGoal, context: MessageContext) -> Message:
     """Return a MoveBase_Goal; raises MessageError where it cannot carry the goal."""
     tolerances = {"dist_tolerance": goal.dist_tolerance, "angle_tolerance": goal.angle_tolerance}
-    _refuse_unsaid("mbf_msgs/action/MoveBase", goal_area=goal.goal_area, **tolerances)
+    _refuse_unsaid("mbf_msgs/action/MoveBase", via=goal.via, goal_area=goal.goal_area, **tolerances)
     if goal.recovery_behaviors == ():
         raise MessageError("mbf_msgs/action/MoveBase cannot ask for no recovery at all: an empty list means all")
     return {

@@ -1,24 +1,26 @@
-"""FollowWaypoints and NavigateThroughPoses of nav2_msgs, which are both sequences of ``move_base`` goals of ours.
+"""FollowWaypoints and NavigateThroughPoses of nav2_msgs.
 
-So the robot stops at each pose of NavigateThroughPoses, which Nav2 drives through; see decision 0032.
+The first is a sequence of ``move_base`` goals, at each of which the robot stops; the other is one goal with via poses,
+which it drives through.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import pairwise
+from collections.abc import Callable
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import (
     FollowWaypointsFeedback,
     FollowWaypointsGoal,
     FollowWaypointsResult,
+    MoveBaseFeedback,
+    MoveBaseGoal,
     MoveBaseResult,
 )
 from mbf_abstract.outcomes import GetPathOutcome, MoveBaseOutcome
 from mbf_ros.messages import nav2_codes as codes
 from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal
-from mbf_ros.messages.geometry import MessageContext, duration, pose_stamped
+from mbf_ros.messages.geometry import MessageContext, pose_stamped
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.messages.nav2_actions import GoalsMapping, error_msg, navigate_feedback, poses_or_refuse, unsupported
 
@@ -101,17 +103,17 @@ def waypoints_of_client(
 
 
 # ----------------------------------------------------------------------------------------------- through poses
-def _through_goal_of(message: Message, context: MessageContext) -> FollowWaypointsGoal:
-    """Each pose is a waypoint, and the first that cannot be reached ends the goal."""
+def _through_goal_of(message: Message, context: MessageContext) -> MoveBaseGoal:
+    """The last pose is the target, and the others lie on the way."""
     code = codes.NavigateThroughPosesCode.FAILED_TO_LOAD_BEHAVIOR_TREE
     unsupported(message, MoveBaseOutcome.FAILURE, "behavior_tree", error_code=code)
     poses = poses_or_refuse(message["poses"], context, "poses")
     if not poses:
         raise RefusedGoal(GetPathOutcome.INVALID_GOAL, "poses: there is none")
-    return FollowWaypointsGoal(poses)
+    return MoveBaseGoal(poses[-1], via=poses[:-1])
 
 
-def _through_result(result: FollowWaypointsResult, context: MessageContext) -> Message:
+def _through_result(result: MoveBaseResult, context: MessageContext) -> Message:
     return {
         "error_code": codes.navigating_through_poses_code(result.outcome),
         "error_msg": error_msg(result),
@@ -119,53 +121,38 @@ def _through_result(result: FollowWaypointsResult, context: MessageContext) -> M
     }
 
 
-def _through_feedback(feedback: FollowWaypointsFeedback, context: MessageContext) -> Message:
-    """Feedback of the present leg; there must be one."""
-    assert feedback.driving is not None
-    leg = navigate_feedback(feedback.driving, context)
-    return {**leg, "number_of_poses_remaining": 0, "waypoint_statuses": []}
+def _through_feedback(feedback: MoveBaseFeedback, context: MessageContext) -> Message:
+    """Distance and time are those of the whole way that is left; the target is one of the poses."""
+    fields = navigate_feedback(feedback, context)
+    return {**fields, "number_of_poses_remaining": feedback.via_left + 1, "waypoint_statuses": []}
 
 
 def waypoint_statuses(
-    goal: FollowWaypointsGoal, results: Sequence[MoveBaseResult], context: MessageContext
+    goal: MoveBaseGoal, feedback: MoveBaseFeedback | None, result: MoveBaseResult | None, context: MessageContext
 ) -> list[Message]:
-    """Return a nav2_msgs/WaypointStatus of each pose of a goal, of which ``results`` are the visits that have ended."""
-    states = [codes.WaypointState.COMPLETED if one.success else codes.WaypointState.FAILED for one in results]
-    states += [codes.WaypointState.PENDING] * (len(goal.waypoints) - len(states))
-    statuses = [
-        _waypoint_status(state, visit, pose, context)
-        for visit, (state, pose) in enumerate(zip(states, goal.waypoints, strict=True))
+    """Return a nav2_msgs/WaypointStatus of each pose of a goal.
+
+    Parameters
+    ----------
+    goal : MoveBaseGoal
+    feedback : MoveBaseFeedback, optional
+        The newest one; None where the robot has not set out.
+    result : MoveBaseResult, optional
+        None while the goal runs. Where it failed, the pose that the robot was on its way to is the one that it missed.
+    context : MessageContext
+    """
+    poses = (*goal.via, goal.target_pose)
+    passed = len(goal.via) - feedback.via_left if feedback is not None else 0
+    states = [codes.WaypointState.COMPLETED] * (len(poses) if result is not None and result.success else passed)
+    states += [codes.WaypointState.PENDING] * (len(poses) - len(states))
+    missed: Message = {}
+    if result is not None and not result.success:
+        states[passed] = codes.WaypointState.FAILED
+        missed = {"error_code": codes.navigating_through_poses_code(result.outcome), "error_msg": error_msg(result)}
+    return [
+        {**_waypoint_status(state, index, pose, context), **(missed if state is codes.WaypointState.FAILED else {})}
+        for index, (state, pose) in enumerate(zip(states, poses, strict=True))
     ]
-    for status, result in zip(statuses, results, strict=False):
-        code = codes.navigating_through_poses_code(result.outcome)
-        status.update(error_code=code, error_msg=error_msg(result))
-    return statuses
-
-
-def through_poses_progress(
-    goal: FollowWaypointsGoal, shown: FollowWaypointsFeedback | FollowWaypointsResult
-) -> Message:
-    """Return what is left of the whole way: the leg that is driven, if any, then straight from pose to pose."""
-    driving = shown.driving if isinstance(shown, FollowWaypointsFeedback) else None
-    done = len(shown.results)
-    if driving is None:
-        return {
-            "distance_remaining": _straight(goal.waypoints[max(done - 1, 0) :]),
-            "number_of_poses_remaining": len(goal.waypoints) - done,
-        }
-    rest = goal.waypoints[done:]
-    whole = driving.distance_along_path + _straight(rest)
-    share = whole / driving.distance_along_path if driving.distance_along_path > 0.0 else 1.0
-    return {
-        "distance_remaining": whole,
-        "estimated_time_remaining": duration(driving.time_to_goal * share),
-        "number_of_poses_remaining": len(rest),
-    }
-
-
-def _straight(poses: Sequence[Pose]) -> float:
-    """Length [m] of the lines from pose to pose; those between two frames do not count."""
-    return sum(one.distance_to(other) for one, other in pairwise(poses) if one.frame_id == other.frame_id)
 
 
 NAVIGATE_THROUGH_POSES = GoalsMapping(
@@ -173,7 +160,7 @@ NAVIGATE_THROUGH_POSES = GoalsMapping(
     _through_goal_of,
     _through_result,
     _through_feedback,
-    FollowWaypointsResult,
+    MoveBaseResult,
     field="poses",
 )
 FOLLOW_WAYPOINTS = ActionMapping(

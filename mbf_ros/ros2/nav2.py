@@ -14,7 +14,13 @@ from typing import Any
 from mbf_abstract.actions.move_base_machine import SUB_GOAL_SLOT
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose, normalize_angle
-from mbf_abstract.goals.goal_types import FollowWaypointsFeedback, FollowWaypointsResult, RecoveryGoal
+from mbf_abstract.goals.goal_types import (
+    FollowWaypointsFeedback,
+    FollowWaypointsResult,
+    MoveBaseFeedback,
+    MoveBaseResult,
+    RecoveryGoal,
+)
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
@@ -148,23 +154,23 @@ class ThroughPosesAction(Nav2Action):
     def _observe(self, goal_handle: Any, handle: AnyGoalHandle) -> More:
         taken, goal = super()._observe(goal_handle, handle), handle.goal
 
-        def more(shown: FollowWaypointsFeedback | FollowWaypointsResult) -> Message:
-            statuses = nav2_waypoints.waypoint_statuses(goal, shown.results, self._context())
-            progress = nav2_waypoints.through_poses_progress(goal, shown)
-            return {**taken(shown), "waypoint_statuses": statuses, **progress}
+        def more(shown: MoveBaseFeedback | MoveBaseResult) -> Message:
+            newest, result = (handle.feedback, shown) if isinstance(shown, MoveBaseResult) else (shown, None)
+            statuses = nav2_waypoints.waypoint_statuses(goal, newest, result, self._context())
+            return {**taken(shown), "waypoint_statuses": statuses}
 
         return more
 
-    def _publish_feedback(self, goal_handle: Any, feedback: Any, more: More) -> None:
-        if feedback.driving is not None:  # between two legs nothing is driven
-            super()._publish_feedback(goal_handle, feedback, more)
-
     def _show_last(self, goal_handle: Any, handle: AnyGoalHandle, more: More) -> None:
-        """Publish where the robot is at the end, and what is left of the way."""
+        """Publish where the robot is at the end, and what is left of the way: nothing for one that has arrived."""
+        newest, result = handle.feedback, handle.result
+        assert result is not None and self._mapping.feedback is not None
         with suppress(RobotStateError):
             pose = pose_stamped(self._server.runtime.robot.pose(), self._context())
-            values = {"current_pose": pose, **more(handle.feedback or handle.result)}
-            goal_handle.publish_feedback(fill(self._class.Feedback(), values))
+            left = {"number_of_poses_remaining": 0 if result.success else len(handle.goal.via) + 1}
+            if newest is not None and not result.success:
+                left = self._mapping.feedback(newest, self._context())
+            goal_handle.publish_feedback(fill(self._class.Feedback(), {**left, "current_pose": pose, **more(result)}))
 
 
 class WaypointsAction(Nav2Action):

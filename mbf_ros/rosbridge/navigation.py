@@ -30,6 +30,7 @@ ACTIONS: dict[str, ActionMapping[Any, Any]] = {
     "/compute_path_through_poses": nav2_actions.COMPUTE_PATH_THROUGH_POSES,
     "/follow_path": nav2_actions.FOLLOW_PATH,
     "/navigate_to_pose": nav2_actions.NAVIGATE_TO_POSE,
+    "/navigate_through_poses": nav2_waypoints.NAVIGATE_THROUGH_POSES,
     "/follow_waypoints": nav2_waypoints.FOLLOW_WAYPOINTS,
     "/smooth_path": nav2_actions.SMOOTH_PATH,
 }

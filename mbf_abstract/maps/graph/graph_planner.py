@@ -6,7 +6,6 @@ directions they are up to 8 % longer. Cost: 10 to 20 ms for 10,000 nodes a leg; 
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -32,19 +31,20 @@ class GraphPlanner(AbstractPlanner):
         """Search leg by leg."""
         free = self._map.free_nodes()
         stops = (request.start, *request.via, request.goal)
+        names = ("start", *(f"via pose {number}" for number in range(1, len(stops) - 1)), "goal")
         ends = [self._ends(pose, request.dist_tolerance if pose is request.goal else 0.0, free) for pose in stops]
-        for pose, nodes in zip(stops, ends, strict=True):
+        for pose, nodes, name in zip(stops, ends, names, strict=True):
             if not len(nodes):
-                return self._refused(pose, is_start=pose is request.start)
+                return self._refused(pose, name)
         graph, here = self._graph(free), int(ends[0][0])
         chain, cost = [here], 0.0
-        for _, targets in pairwise(ends):
+        for targets, name in zip(ends[1:], names[1:], strict=True):
             if request.cancel_token.cancelled:
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             costs, before = _dijkstra(graph, here)
             reached = targets[np.isfinite(costs[targets])]
             if not len(reached):
-                return PlanResult(GetPathOutcome.NO_PATH_FOUND, "start and goal are not connected")
+                return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"start and {name} are not connected")
             leg, here = [int(reached[0])], int(reached[0])
             cost += float(costs[here])
             while leg[-1] != chain[-1]:
@@ -63,12 +63,12 @@ class GraphPlanner(AbstractPlanner):
         near = np.flatnonzero(free & (gaps <= tolerance))
         return np.concatenate([itself, near[np.argsort(gaps[near], kind="stable")]])
 
-    def _refused(self, pose: Pose, is_start: bool) -> PlanResult:
+    def _refused(self, pose: Pose, name: str) -> PlanResult:
         answer = self._map.place(pose.x, pose.y)
-        place = f"({pose.x:.2f}, {pose.y:.2f})"
+        place = f"the {name} ({pose.x:.2f}, {pose.y:.2f})"
         if self._map.node_at(pose.x, pose.y) < 0:
             return PlanResult(GetPathOutcome.OUT_OF_MAP, f"there is no ground at {place}")
-        return PlanResult(START if is_start else GOAL, f"{place} is {answer.state.name}, cost {answer.cost:.2f}")
+        return PlanResult(START if name == "start" else GOAL, f"{place} is {answer.state.name}, cost {answer.cost:.2f}")
 
     def _graph(self, free: BoolArray) -> Any:
         """Sparse matrix of what an edge between free nodes costs: its length, longer by the costs."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from mbf_abstract.goals.goal_area import DiscArea
-from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal
-from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
-from mbf_abstract.testing.conformance.rig import Box
+from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseFeedback, MoveBaseGoal
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
+from mbf_abstract.testing.conformance.rig import START, Box
 from mbf_abstract.testing.conformance.site import Site, situation, somewhere
 
 CORNERS = ((2.0, 4.0), (5.0, 4.0), (5.0, 6.0), (2.0, 6.0), (2.0, 4.0))
@@ -125,6 +125,40 @@ def a_newer_goal_takes_over_while_driving(site: Site) -> None:
     site.expect_outcome(first.wait(1.0), MoveBaseOutcome.CANCELED)
     site.expect_outcome(second.wait(60.0), MoveBaseOutcome.SUCCESS)
     site.expect_near(5.0, 6.0, 0.3, "arrived at the newer goal")
+
+
+@situation(planner_frequency=2.0)
+def via_poses_are_driven_through_without_a_stop(site: Site) -> None:
+    """move_base passes its via poses in order, also one behind an obstacle and one on the way back, without a stop."""
+    places = ((3.0, 4.0), (4.0, 4.2), (6.5, 4.0))
+    handle = site.navigator.send(MoveBaseGoal(somewhere(5.5, 5.5), via=tuple(somewhere(*place) for place in places)))
+    seen: list[tuple[int, bool]] = []
+
+    def note(feedback: MoveBaseFeedback) -> None:
+        seen.append((feedback.via_left, site.rig.robot.command.is_stopped()))
+
+    handle.add_feedback_callback(note)
+    site.rig.clock.sleep(0.5)
+    site.rig.boxes = [Box(5.2, 3.5, 5.5, 4.5)]
+    site.expect_outcome(handle.wait(120.0), MoveBaseOutcome.SUCCESS)
+    site.expect_visits((*places, (5.5, 5.5)))
+    site.expect_near(5.5, 5.5, 0.3, "arrived")
+    site.expect_no_contact()
+    left = [count for count, _ in seen]
+    site.expect(left == sorted(left, reverse=True), f"via_left went up again: {left}")
+    site.expect(left[:1] == [3] and left[-1:] == [0], f"via_left went from {left[:1]} to {left[-1:]}, not from 3 to 0")
+    behind = [stopped for count, stopped in seen if count == 2]
+    site.expect(bool(behind) and not any(behind), "the robot stopped at its first via pose")
+
+
+@situation()
+def a_blocked_via_pose_ends_the_goal_and_is_named(site: Site) -> None:
+    """A via pose on an obstacle ends the goal with the outcome of its leg and a text that names the pose."""
+    site.place(Box(4.0, 3.5, 4.4, 4.5))
+    via = (somewhere(3.0, 4.0), somewhere(4.0, 4.0))
+    result = site.navigator.go_to(somewhere(3.0, 5.0), via=via, recovery_behaviors=())
+    site.expect_outcome(result, GetPathOutcome.BLOCKED_GOAL, "via pose 2")
+    site.expect_near(START.x, START.y, 0.1, "nothing was driven")
 
 
 @situation()

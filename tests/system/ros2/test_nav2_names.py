@@ -110,9 +110,10 @@ def test_a_canceled_task_leaves_the_robot_standing(crew):
 
 
 @ON_COSTMAP
-def test_every_pose_of_a_way_is_reached_in_its_order(crew):
+def test_every_pose_of_a_way_is_passed_in_its_order(crew):
     end = run(crew, "navigate_through_poses", {"poses": {"goals": [at(0.5), at(0.5, 0.5)]}})
     assert (end["status"], end["error_code"]) == ("succeeded", 0)
+    assert end["feedback"][-1]["number_of_recoveries"] == 0
     assert [one["waypoint_status"] for one in end["waypoint_statuses"]] == [codes.WaypointState.COMPLETED] * 2
     remaining = [one["number_of_poses_remaining"] for one in end["feedback"]]
     assert remaining == sorted(remaining, reverse=True)

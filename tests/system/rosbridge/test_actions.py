@@ -96,6 +96,7 @@ NEAR = {"poses": [target(0.0), target(0.2), target(0.4)]}
         ("/compute_path_through_poses", "nav2_msgs/ComputePathThroughPoses", {"goals": [target(0.2), target(0.4)]}),
         ("/follow_path", "nav2_msgs/FollowPath", {"path": NEAR}),
         ("/navigate_to_pose", "nav2_msgs/NavigateToPose", {"pose": target(0.4)}),
+        ("/navigate_through_poses", "nav2_msgs/NavigateThroughPoses", {"poses": [target(0.2), target(0.4)]}),
         ("/follow_waypoints", "nav2_msgs/FollowWaypoints", {"poses": [target(0.2), target(0.4)]}),
         ("/smooth_path", "nav2_msgs/SmoothPath", {"path": NEAR}),
     ],

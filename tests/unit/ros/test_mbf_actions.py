@@ -173,6 +173,7 @@ def test_the_command_of_a_car_is_its_speed_and_steering_angle():
         (mbf.exe_path_goal, ExePathGoal(Path([[0, 0, 0]]), dist_tolerance=0.1), "both tolerances or none"),
         (mbf.move_base_goal, MoveBaseGoal(Pose.planar(1, 2), dist_tolerance=0.1), "no field for dist_tolerance"),
         (mbf.move_base_goal, MoveBaseGoal(Pose.planar(1, 2), recovery_behaviors=()), "no recovery at all"),
+        (mbf.move_base_goal, MoveBaseGoal(Pose.planar(1, 2), via=(Pose.planar(0, 1),)), "no field for via"),
         (
             mbf.move_base_goal,
             MoveBaseGoal(Pose.planar(1, 2), goal_area=DiscArea(Pose.planar(1, 2), 3)),

@@ -9,9 +9,10 @@ from mbf_abstract.goals.goal_types import (
     ExePathFeedback,
     ExePathResult,
     FollowWaypointsFeedback,
-    FollowWaypointsGoal,
     FollowWaypointsResult,
     GetPathResult,
+    MoveBaseFeedback,
+    MoveBaseGoal,
     MoveBaseResult,
     RefinePathResult,
 )
@@ -24,7 +25,6 @@ from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import MessageError, completed, fields_of
 
 CONTEXT = MessageContext()
-REACHED = MoveBaseResult(0, "")
 PATH = Path([[0, 0, 0], [1, 0, 0]])
 
 
@@ -38,10 +38,14 @@ LISTS = pytest.mark.parametrize(
 
 
 @LISTS
-def test_a_way_through_poses_visits_each_and_ends_at_the_first_it_cannot_reach(goals):
+def test_a_way_through_poses_leads_to_the_last_one_by_way_of_the_others(goals):
     goal = waypoints.NAVIGATE_THROUGH_POSES.goal({"poses": goals}, CONTEXT)
-    assert [pose.x for pose in goal.waypoints] == [1, 2, 3]
-    assert (goal.loops, goal.stop_on_failure) == (1, True)
+    assert ([pose.x for pose in goal.via], goal.target_pose.x) == ([1, 2], 3)
+
+
+def test_a_way_through_no_poses_is_refused():
+    with pytest.raises(RefusedGoal, match="there is none"):
+        waypoints.NAVIGATE_THROUGH_POSES.goal({"poses": []}, CONTEXT)
 
 
 def test_goals_of_jazzy_lack_fields_that_came_later():
@@ -49,7 +53,7 @@ def test_goals_of_jazzy_lack_fields_that_came_later():
     assert len(nav2.FOLLOW_PATH.goal_of({"path": path, "controller_id": "", "goal_checker_id": ""}, CONTEXT).path) == 1
     poses = path["poses"]
     assert waypoints.FOLLOW_WAYPOINTS.goal_of({"poses": poses}, CONTEXT).visits == 1
-    assert len(waypoints.NAVIGATE_THROUGH_POSES.goal_of({"poses": poses}, CONTEXT).waypoints) == 1
+    assert len(waypoints.NAVIGATE_THROUGH_POSES.goal_of({"poses": poses}, CONTEXT).via) == 0
 
 
 @LISTS
@@ -144,10 +148,10 @@ RESULTS = [
     (nav2.NAVIGATE_TO_POSE, MoveBaseResult(MoveBaseOutcome.TF_ERROR, "no pose"), 9002),
     (nav2.NAVIGATE_TO_POSE, MoveBaseResult(MoveBaseOutcome.FAILURE, "no such planner"), 9000),
     (waypoints.FOLLOW_WAYPOINTS, FollowWaypointsResult(GetPathOutcome.NO_PATH_FOUND, "missed one"), 600),
-    (waypoints.NAVIGATE_THROUGH_POSES, FollowWaypointsResult(0, ""), 0),
-    (waypoints.NAVIGATE_THROUGH_POSES, FollowWaypointsResult(GetPathOutcome.BLOCKED_GOAL, "occupied"), 306),
-    (waypoints.NAVIGATE_THROUGH_POSES, FollowWaypointsResult(MoveBaseOutcome.TF_ERROR, "no pose"), 9102),
-    (waypoints.NAVIGATE_THROUGH_POSES, FollowWaypointsResult(ExePathOutcome.ROBOT_STUCK, "stuck"), 105),
+    (waypoints.NAVIGATE_THROUGH_POSES, MoveBaseResult(0, ""), 0),
+    (waypoints.NAVIGATE_THROUGH_POSES, MoveBaseResult(GetPathOutcome.BLOCKED_GOAL, "occupied"), 306),
+    (waypoints.NAVIGATE_THROUGH_POSES, MoveBaseResult(MoveBaseOutcome.TF_ERROR, "no pose"), 9102),
+    (waypoints.NAVIGATE_THROUGH_POSES, MoveBaseResult(ExePathOutcome.ROBOT_STUCK, "stuck"), 105),
     (nav2.SMOOTH_PATH, RefinePathResult(0, "", PATH), 0),
     (nav2.SMOOTH_PATH, RefinePathResult(RefinePathOutcome.INVALID_PLUGIN, "no such refiner", PATH), 501),
     (nav2.SMOOTH_PATH, RefinePathResult(RefinePathOutcome.STOPPED, "late", PATH), 502),
@@ -198,7 +202,7 @@ def test_feedback_has_the_fields_of_its_type():
         (nav2.NAVIGATE_TO_POSE, driving),
         (nav2.FOLLOW_PATH, driving),
         (waypoints.FOLLOW_WAYPOINTS, FollowWaypointsFeedback(4, 1, (), driving)),
-        (waypoints.NAVIGATE_THROUGH_POSES, FollowWaypointsFeedback(1, 1, (), driving)),
+        (waypoints.NAVIGATE_THROUGH_POSES, MoveBaseFeedback(**vars(driving), via_left=1)),
     ):
         message = mapping.feedback(feedback, CONTEXT)
         completed(f"{mapping.type}_Feedback", message)
@@ -207,29 +211,41 @@ def test_feedback_has_the_fields_of_its_type():
     assert nav2.FOLLOW_PATH.feedback(driving, CONTEXT) == {"distance_to_goal": 4.0, "speed": 0.5}
 
 
-def test_progress_through_poses_counts_the_leg_and_then_straight_from_pose_to_pose():
-    goal = FollowWaypointsGoal((Pose.planar(1, 0), Pose.planar(4, 0), Pose.planar(4, 3)))
-    driving = ExePathFeedback(0, "", Pose.planar(0, 0), 3.0, 0.1, 2.0, 4.0)
-    assert waypoints.through_poses_progress(goal, FollowWaypointsFeedback(1, 1, (REACHED,), driving)) == {
-        "distance_remaining": 2.0 + 3.0,
-        "estimated_time_remaining": {"sec": 10, "nanosec": 0},
-        "number_of_poses_remaining": 2,
-    }
-    between = waypoints.through_poses_progress(goal, FollowWaypointsFeedback(1, 1, (REACHED, REACHED), None))
-    assert between == {"distance_remaining": 3.0, "number_of_poses_remaining": 1}
-    ended = waypoints.through_poses_progress(goal, FollowWaypointsResult(0, "", (REACHED,) * 3))
-    assert ended == {"distance_remaining": 0.0, "number_of_poses_remaining": 0}
+def on_the_way(via_left):
+    return MoveBaseFeedback(0, "", Pose.planar(0, 0), 3.0, 0.1, 5.0, 4.0, via_left=via_left)
 
 
-def test_each_pose_has_a_status_whether_it_was_reached_missed_or_is_still_to_come():
-    goal = FollowWaypointsGoal((Pose.planar(1, 0), Pose.planar(2, 0), Pose.planar(3, 0)))
-    results = (MoveBaseResult(0, ""), MoveBaseResult(GetPathOutcome.NO_PATH_FOUND, "blocked"))
-    statuses = waypoints.waypoint_statuses(goal, results, CONTEXT)
+def test_progress_through_poses_is_that_of_the_whole_way():
+    message = waypoints.NAVIGATE_THROUGH_POSES.feedback(on_the_way(via_left=2), CONTEXT)
+    assert (message["number_of_poses_remaining"], message["distance_remaining"]) == (3, 5.0)
+    assert message["estimated_time_remaining"] == {"sec": 4, "nanosec": 0}
+
+
+FAILED = MoveBaseResult(GetPathOutcome.NO_PATH_FOUND, "blocked")
+
+
+@pytest.mark.parametrize(
+    ("feedback", "result", "states"),
+    [
+        (None, None, [0, 0, 0]),
+        (on_the_way(via_left=1), None, [1, 0, 0]),
+        (on_the_way(via_left=1), FAILED, [1, 3, 0]),
+        (on_the_way(via_left=0), FAILED, [1, 1, 3]),
+        (None, FAILED, [3, 0, 0]),
+        (on_the_way(via_left=0), MoveBaseResult(0, ""), [1, 1, 1]),
+        (None, MoveBaseResult(0, ""), [1, 1, 1]),
+    ],
+)
+def test_each_pose_has_a_status_whether_it_was_passed_missed_or_is_still_to_come(feedback, result, states):
+    goal = MoveBaseGoal(Pose.planar(3, 0), via=(Pose.planar(1, 0), Pose.planar(2, 0)))
+    statuses = waypoints.waypoint_statuses(goal, feedback, result, CONTEXT)
     for status in statuses:
         assert completed("nav2_msgs/WaypointStatus", status) == status
-    assert [one["waypoint_status"] for one in statuses] == [1, 3, 0]
+    assert [one["waypoint_status"] for one in statuses] == states
     assert [one["waypoint_pose"]["pose"]["position"]["x"] for one in statuses] == [1, 2, 3]
-    assert (statuses[1]["error_code"], statuses[1]["error_msg"]) == (308, "NO_PATH_FOUND: blocked")
+    for status, state in zip(statuses, states, strict=True):
+        wanted = (308, "NO_PATH_FOUND: blocked") if state == codes.WaypointState.FAILED else (0, "")
+        assert (status["error_code"], status["error_msg"]) == wanted
 
 
 @pytest.mark.parametrize(
