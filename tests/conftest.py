@@ -13,6 +13,9 @@ settings.register_profile("repeat", derandomize=True, deadline=None)
 settings.register_profile("explore", deadline=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeat"))
 
+LONGEST = ("unit/actions/test_interleavings.py", "determinism/", "system/ros2/test_actions_and_services.py")
+"""Files of minutes. A worker takes a file whole, so these come first: the last ones to begin are short."""
+
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
@@ -21,6 +24,11 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no shared data at {folder}; set MBF_DATA to the folder that holds maps/ and meshes/")
     return folder
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the longest files first; all else stays in its order."""
+    items.sort(key=lambda item: not any(f"tests/{part}" in item.path.as_posix() for part in LONGEST))
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
