@@ -7,8 +7,8 @@
 3. Every path that was not looked at passes a closed portal. So no path of the whole map costs less than the lesser of
    the found cost and the least bound of the closed portals. If the found cost is within the tolerance of that, it is
    **proven**. If the memory holds all tiles that stand against it, they are loaded, which proves it.
-4. Else the corridor is widened until that makes the path no cheaper: the cost is **compared**. Bounds are far too low
-   where portals are much longer than edges, as a path along the border of a tile passes from portal to portal for the
+4. Else the corridor is widened until that makes the path no cheaper: the cost is **compared**. The exact search goes on
+   from the distances that it left in the narrower corridor, so it visits what is new. Bounds are far too low where portals are much longer than edges, as a path along the border of a tile passes from portal to portal for the
    price of an edge; so on large maps costs are compared, not proven. The result states which.
 """
 
@@ -113,6 +113,7 @@ class CorridorSearch:
         self._bounds = _through(tiled.portals, ends)
         self._estimates = _through(tiled.estimates, ends)
         self._least_estimate = self._find_least_estimate()
+        self._searched: tuple[TileKey, ...] = ()  # tiles with distances that the next exact search goes on from
 
     def run(self) -> TiledPlan:
         """Widen the corridor until the cost is proven, steady, or nothing more can be opened."""
@@ -135,7 +136,7 @@ class CorridorSearch:
             wider, margin = self._widened(corridor, ranks, margin)
             # The same corridor again, or one without portals of this one for want of memory, is no comparison.
             compares = wider.holds(corridor) and not np.array_equal(wider.is_open, corridor.is_open)
-            narrower = plan.cost if compares else np.inf
+            narrower, self._searched = (plan.cost, corridor.tiles) if compares else (np.inf, ())
             corridor = wider
 
     def _widened(self, corridor: _Corridor, ranks: Float32Array, margin: float) -> tuple[_Corridor, float]:
@@ -226,8 +227,11 @@ class CorridorSearch:
     ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.int32]], float] | None:
         """Vertices of the pool from start to goal, and the cost [m]; None without a path or if cancelled."""
         pool, (seeds, targets) = self._tiled.pool, (self._in_pool(place) for place in self._ends)
-        distances, predecessors = pool.search_arrays(tiles)
-        distances[seeds], predecessors[seeds] = self._start.corner_costs, -1
+        distances, predecessors = pool.search_arrays(key for key in tiles if key not in self._searched)
+        if self._searched:
+            seeds = pool.frontier(graph, sorted(self._searched))
+        else:
+            distances[seeds], predecessors[seeds] = self._start.corner_costs, -1
         vertices = pool.vertices[: len(distances)]
         vertices.flags.writeable = False
         step = self._tiled.tile(self._start.key)[1].mean_edge

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph
+from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, frontier
 from mbf_mesh_nav.tiles.index import TileEntry
 from mbf_mesh_nav.tiles.tile import Tile, TileKey
 from mbf_mesh_nav.tiles.tile_graph import TileGraph, frozen_graph
@@ -86,6 +86,12 @@ class TilePool:
             self._distances[first : first + self._vertices_of_slot] = np.inf
         vertices = self._used * self._vertices_of_slot
         return self._distances[:vertices], self._predecessors[:vertices]
+
+    def frontier(self, graph: SearchGraph, keys: Iterable[TileKey]) -> IntArray:
+        """Vertices (n,) of tiles that the last search has reached, from which it goes on in another corridor."""
+        firsts = [self.first_vertex(key) for key in keys]
+        found = [frontier(graph, self._distances, first, first + self._vertices_of_slot) for first in firsts]
+        return np.concatenate(found)
 
     def holds(self, key: TileKey) -> bool:
         """Whether a tile is loaded and has not changed since."""

@@ -129,6 +129,27 @@ def propagate_distances(
         tail, far_count, threshold = raise_threshold(near, far, state, keys, tail, far_count, threshold, step)
 
 
+@kernel
+def frontier(graph: SearchGraph, distances: Float32Array, first: int, end: int) -> IntArray:
+    """Vertices (n,) int32 from ``first`` to before ``end`` that know a cheaper path to a neighbour than it has.
+
+    With these as seeds a search goes on from the distances it left, also where the graph has got more edges since.
+    """
+    found = np.empty(end - first, dtype=np.int32)
+    count = Index(0)
+    for vertex in range(Index(first), Index(end)):
+        base = distances[vertex]
+        if base == np.inf:
+            continue
+        for slot in range(Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])):
+            neighbour = Index(graph.neighbours[slot])
+            if base + graph.weights[slot] < distances[neighbour] and not graph.blocked[neighbour]:
+                found[count] = vertex
+                count += ONE
+                break
+    return found[:count]
+
+
 @inner_kernel
 def straight_line_bound(vertices: FloatArray, vertex: int, goal: FloatArray) -> np.float32:
     """Straight-line distance [m] from a vertex to the goal, rounded down."""

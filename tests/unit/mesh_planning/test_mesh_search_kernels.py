@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_mesh_nav.kernels.compiled import kernel
-from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, propagate_distances
+from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, frontier, propagate_distances
 from mbf_mesh_nav.kernels.search.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 from mbf_mesh_nav.kernels.wave.bucket_queue import (
     EMPTY,
@@ -114,6 +114,32 @@ def test_a_target_stops_the_wave_early_with_its_exact_distance():
     distances, _, _ = run_dijkstra(graph, 0, targets=np.array([target], np.int32))
     assert distances[target] == full[target]
     assert np.isfinite(distances).sum() < np.isfinite(full).sum() / 2
+
+
+@given(seed=st.integers(0, 10**6), target=st.integers(0, 80))
+@settings(max_examples=40, deadline=None)
+def test_a_search_that_was_stopped_goes_on_from_its_frontier_in_a_graph_with_more_edges(seed, target):
+    vertices, offsets, neighbours, weights, blocked = random_grid_graph(seed)
+    closed = np.where(np.random.default_rng(seed).random(len(weights)) < 0.3, np.float32(np.inf), weights)
+    few_edges = vertices, offsets, neighbours, closed, blocked
+    distances, predecessors, _ = run_dijkstra(few_edges, 0, targets=np.array([target], np.int32))
+    graph = SearchGraph(offsets, neighbours, weights, blocked)
+    seeds = frontier(graph, distances, 0, len(blocked))
+    assert seeds.tolist() == naive_frontier(graph, distances)
+    propagate_distances(graph, distances, predecessors, seeds, 0.7, NO_INTS, np.zeros(0, np.float32), CALM)
+    np.testing.assert_array_equal(distances, heap_dijkstra(offsets, neighbours, weights, blocked, 0))
+
+
+def naive_frontier(graph, distances):
+    return [
+        vertex
+        for vertex in range(len(distances))
+        if any(
+            distances[vertex] + graph.weights[slot] < distances[graph.neighbours[slot]]
+            and not graph.blocked[graph.neighbours[slot]]
+            for slot in range(graph.offsets[vertex], graph.offsets[vertex + 1])
+        )
+    ]
 
 
 def test_a_flag_set_before_the_call_cancels_both_searches():

@@ -142,6 +142,19 @@ def test_only_a_corridor_with_other_portals_is_compared(tiled_hills, whole_hills
     assert compared > 2
 
 
+def test_a_search_that_goes_on_in_a_wider_corridor_costs_what_one_from_the_start_costs(
+    tiled_hills, whole_hills, monkeypatch
+):
+    monkeypatch.setattr(corridor_search, "FIRST_MARGIN", 1e-6)
+    monkeypatch.setattr(corridor_search, "LEAST_WIDENING", 0.0)
+    tiled, ends = TiledMap(tiled_hills), whole_hills.free_places(20, 6).reshape(-1, 2, 3)
+    going_on = [plan_on_tiles(tiled, *pair, tolerance=0.0) for pair in ends]
+    monkeypatch.setattr(corridor_search.CorridorSearch, "_searched", property(lambda _: (), lambda *_: None), False)
+    anew = [plan_on_tiles(tiled, *pair, tolerance=0.0) for pair in ends]
+    assert sum(np.isfinite(plan.gain) for plan in going_on) > 2
+    assert [(plan.cost, plan.tiles) for plan in going_on] == [(plan.cost, plan.tiles) for plan in anew]
+
+
 def test_a_map_without_memory_for_a_wider_corridor_compares_nothing(tiled_hills, whole_hills):
     tiled = open_with_slots(tiled_hills, 3)
     for start, goal in whole_hills.free_places(20, 4).reshape(-1, 2, 3):
