@@ -8,8 +8,9 @@
    the found cost and the least bound of the closed portals. If the found cost is within the tolerance of that, it is
    **proven**. If the memory holds all tiles that stand against it, they are loaded, which proves it.
 4. Else the corridor is widened until that makes the path no cheaper: the cost is **compared**. The exact search goes on
-   from the distances that it left in the narrower corridor, so it visits what is new. Bounds are far too low where portals are much longer than edges, as a path along the border of a tile passes from portal to portal for the
-   price of an edge; so on large maps costs are compared, not proven. The result states which.
+   from the distances that it left in the narrower corridor, so it visits what is new. Bounds are far too low where
+   portals are much longer than edges, as a path along the border of a tile passes from portal to portal for the price
+   of an edge; so on large maps costs are compared, not proven. The result states which.
 """
 
 from __future__ import annotations
