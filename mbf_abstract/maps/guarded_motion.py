@@ -14,7 +14,7 @@ time over                          PAT_EXCEEDED
 something ahead would be touched   IMPASSABLE, the place
 somebody would be at any speed     IMPASSABLE, whom
 the gate refuses a command         STOPPED
-no fresh pose                      TF_ERROR
+no fresh pose or velocity          TF_ERROR
 the map is stale                   it waits, and goes on when the map is fresh again within its time
 =================================  =====================================================================
 
@@ -61,7 +61,7 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
         return self.navigation_map.obstacle_ahead(self.on_map(pose), command, self.parameters.check_ahead_time)
 
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
-        """Run ``recover``, report a lost pose as TF_ERROR, and send zero velocity at the end."""
+        """Run ``recover``, report a lost pose or velocity as TF_ERROR, and send zero velocity at the end."""
         try:
             return self.recover(request)
         except (RobotStateError, TransformError) as error:
@@ -93,7 +93,8 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
             answer = Twist() if stale else velocity(pose)
             if isinstance(answer, RecoveryResult):
                 return answer
-            share, reason, _ = self.navigation_map.safe_share(self.on_map(pose), answer, answer, self.clock.now())
+            here, measured = self.on_map(pose), motion.velocity()
+            share, reason, _ = self.navigation_map.safe_share(here, measured, answer, self.clock.now())
             if obstacle := reason if share == 0.0 else self.obstacle_ahead(pose, answer):
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, obstacle)
             refusals = 0 if motion.send(slower(answer, share)) else refusals + 1

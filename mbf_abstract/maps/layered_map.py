@@ -94,12 +94,13 @@ class LayeredMap(NavigationMap):
         """The least share that any layer with moving objects allows."""
         least = super().safe_share(pose, velocity, command, now)
         with self._lock:
-            tracking = [(layer, layer.tracked_objects(now)) for layer in self.layers.enabled]
+            tracking = [(layer, layer.guarded_objects(now)) for layer in self.layers.enabled]
         for layer, objects in tracking:
             limits = layer.parameters
             if not objects or not isinstance(limits, ContactParameters) or not limits.stop_before_contact:
                 continue
-            share, touched = safe_share(self.robot_box, pose, velocity, command, objects, limits)
+            asked = self.robot_box, pose, velocity, command, objects, limits, self.same_storey
+            share, touched = safe_share(*asked)
             if touched is not None and share < least[0]:
                 least = share, in_the_way(touched), limits.max_wait
         return least

@@ -123,7 +123,7 @@ class MapQueries:
         if not objects or len(path) == 0:
             return ()
         there = self._transforms.transform_path(path, served.map.frame_id)
-        return blockages(served.map.robot_box, there, objects, within_time)
+        return blockages(served.map.robot_box, there, objects, within_time, served.map.same_storey)
 
     def _tracking(self) -> tuple[Served, tuple[TrackedObject, ...]]:
         """The first map that knows objects, the local one first, and they."""

@@ -18,7 +18,7 @@ from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.maps.tracking.contact import RobotBox
+from mbf_abstract.maps.tracking.contact import SAME_STOREY, RobotBox
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_abstract.plugins import Plugin, PluginContext
@@ -43,6 +43,8 @@ class NavigationMap(ABC):
     """Whether an update needs the robot's pose."""
     knows_outline: bool = False
     """Whether the robot's outline is checked in its heading, instead of its inscribed circle."""
+    same_storey: float = SAME_STOREY
+    """Moving objects farther above or below the robot [m] are on another storey; infinite where heights are unknown."""
     floors_taken: int = 0
     """How often an update has taken up a floor that came at run time, see ``take_floor``."""
 

@@ -78,6 +78,10 @@ class MovingObstaclesLayer(GridLayer):
         """The objects it follows."""
         return self._objects.objects(now)
 
+    def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
+        """Also those that were cleared and are not seen again yet."""
+        return self._objects.guarded_objects(now)
+
     def set_footprint(self, footprint: Footprint) -> None:
         """Take over the inscribed radius."""
         self._inscribed_radius = footprint.inscribed_radius if len(footprint.vertices) > 2 else 0.0

@@ -5,6 +5,7 @@ No lock is held while a question is answered.
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from dataclasses import replace
 
@@ -34,6 +35,7 @@ class SnapshotAnswers(LayeredMap):
     footprint: Footprint
     unpadded_footprint: Footprint
     knows_outline = True
+    same_storey = math.inf
 
     @abstractmethod
     def snapshot(self) -> Costmap:
@@ -52,8 +54,7 @@ class SnapshotAnswers(LayeredMap):
             return RobotBox.disc(0.0)
         if outline.circumscribed_radius < ROUND * outline.inscribed_radius:
             return RobotBox.disc(outline.circumscribed_radius)
-        (back, right), (front, left) = outline.vertices.min(axis=0).tolist(), outline.vertices.max(axis=0).tolist()
-        return RobotBox(back, front, right, left, 0.0)
+        return RobotBox.around(outline.vertices)
 
     @property
     def robot_outline(self) -> FloatArray:

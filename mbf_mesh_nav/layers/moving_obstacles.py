@@ -95,6 +95,10 @@ class MovingObstaclesLayer(MeshLayer):
         """The objects it follows."""
         return self._objects.objects(now)
 
+    def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
+        """Also those that were cleared and are not seen again yet."""
+        return self._objects.guarded_objects(now)
+
     def take_over(self, old: MeshLayer) -> None:
         """Take over the objects with their sensors, and the trails on this part of the surface."""
         assert isinstance(old, MovingObstaclesLayer)

@@ -157,6 +157,22 @@ def test_none_moves_where_it_could_not_stop_before_somebody(world, run, name):
     assert all(command.is_stopped() for command in motion.commands)
 
 
+class RollingMotion(RigMotion):
+    """The robot has not come to rest yet when the recovery begins."""
+
+    def velocity(self):
+        return Twist.planar(0.5)
+
+
+def test_what_is_safe_is_asked_with_the_velocity_that_was_measured(world, run):
+    navigation_map, asked = world.map_of(nothing), []
+    navigation_map.safe_share = lambda pose, velocity, command, now: asked.append((velocity, command)) or (1.0, "", 0.0)
+    result, _ = run("back_up", navigation_map, RollingMotion)
+    assert result.success, result.message
+    assert {velocity for velocity, _ in asked} == {Twist.planar(0.5)}
+    assert all(command.vx < 0.0 for _, command in asked)
+
+
 def test_one_drives_no_faster_than_is_safe_among_those_who_move(world, run):
     commands = []
     for share in (1.0, 0.25):

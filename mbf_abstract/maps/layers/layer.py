@@ -64,6 +64,10 @@ class MapLayer(ABC):
         """The objects that the layer follows, at ``now`` [s]; none if it follows none."""
         return ()
 
+    def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
+        """Those before which the robot stops: also what was cleared, until it is seen again or forgotten."""
+        return self.tracked_objects(now)
+
     def configuration_warning(self) -> str:
         """A legal but suspicious parameter of the layer; empty if there is none."""
         return ""

@@ -100,7 +100,7 @@ class MovingAround:
         limits : AvoidanceParameters
         """
         known = navigation_map.tracked_objects(now) if limits.weight > 0.0 else ()
-        moving = moving_on_storey(known, pose.z)
+        moving = moving_on_storey(known, pose.z, navigation_map.same_storey)
         rows = [(one.x - pose.x, one.y - pose.y, one.vx, one.vy, one.radius) for one in moving]
         objects = np.array(rows, dtype=np.float32).reshape(-1, OBJECT_COLUMNS)
         return cls(moving, objects, pose.yaw, np.array(navigation_map.robot_box, dtype=np.float32), limits)

@@ -35,7 +35,13 @@ class Blockage:
     distance: float
 
 
-def blockages(box: RobotBox, path: Path, objects: Iterable[TrackedObject], within_time: float) -> tuple[Blockage, ...]:
+def blockages(
+    box: RobotBox,
+    path: Path,
+    objects: Iterable[TrackedObject],
+    within_time: float,
+    same_storey: float = SAME_STOREY,
+) -> tuple[Blockage, ...]:
     """Objects that block a path, in the order of their places along it.
 
     Parameters
@@ -46,6 +52,8 @@ def blockages(box: RobotBox, path: Path, objects: Iterable[TrackedObject], withi
     objects : iterable of TrackedObject
     within_time : float
         How far ahead [s] the places of moving objects count; 0 = only where they are now.
+    same_storey : float
+        Poses farther above or below an object [m] are on another storey.
     """
     poses = np.array([(pose.x, pose.y, pose.yaw) for pose in path]).reshape(-1, 3)
     heights = path.positions[:, 2]
@@ -56,7 +64,7 @@ def blockages(box: RobotBox, path: Path, objects: Iterable[TrackedObject], withi
         places = np.column_stack(known.position_in(times))
         on_each = np.broadcast_to(places, (len(poses), *places.shape))
         gaps = box.gaps(poses, on_each, np.full(len(times), known.radius))
-        touches = (gaps < 0.0).any(axis=1) & (np.abs(heights - known.z) < SAME_STOREY)
+        touches = (gaps < 0.0).any(axis=1) & (np.abs(heights - known.z) < same_storey)
         if touches.any():
             pose = int(np.argmax(touches))
             found.append(Blockage(known, pose, path.length - float(path.remaining_lengths[pose])))

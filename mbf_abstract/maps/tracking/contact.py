@@ -14,6 +14,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.maps.tracking.braking import Decelerations, motions_to_standstill
@@ -25,7 +26,7 @@ SHARES = (1.0, 0.75, 0.5, 0.25)
 CORNERS = 16
 """Of the outline of a round robot."""
 SAME_STOREY = 1.0
-"""Objects whose ground is farther above or below the robot [m] are on another storey."""
+"""Objects whose ground is farther above or below the robot [m] are on another storey, on a map that knows heights."""
 
 
 class ContactParameters(ParameterModel):
@@ -68,6 +69,13 @@ class RobotBox(NamedTuple):
         """Box of a round robot."""
         return cls(0.0, 0.0, 0.0, 0.0, radius)
 
+    @classmethod
+    def around(cls, corners: ArrayLike) -> RobotBox:
+        """Box around an outline with ``corners`` (n, 2) [m], x forward and y left."""
+        outline = np.asarray(corners, dtype=np.float64)
+        (back, right), (front, left) = outline.min(axis=0).tolist(), outline.max(axis=0).tolist()
+        return cls(back, front, right, left, 0.0)
+
     def outline(self) -> FloatArray:
         """Corners (n, 2) [m], counter-clockwise; of a polygon around a round robot."""
         if self.radius > 0.0:
@@ -86,9 +94,11 @@ class RobotBox(NamedTuple):
         return np.asarray(np.hypot(beyond_x, beyond_y) - self.radius - radii)
 
 
-def moving_on_storey(objects: Iterable[TrackedObject], z: float) -> list[TrackedObject]:
-    """Those of the objects that move, on the storey of a robot at height ``z`` [m]."""
-    return [known for known in objects if known.motion is Motion.MOVING and abs(known.z - z) < SAME_STOREY]
+def moving_on_storey(
+    objects: Iterable[TrackedObject], z: float, same_storey: float = SAME_STOREY
+) -> list[TrackedObject]:
+    """Those of the objects that move, less than ``same_storey`` [m] above or below a robot at height ``z`` [m]."""
+    return [known for known in objects if known.motion is Motion.MOVING and abs(known.z - z) < same_storey]
 
 
 def in_the_way(known: TrackedObject) -> str:
@@ -103,6 +113,7 @@ def safe_share(
     command: Twist,
     objects: Sequence[TrackedObject],
     limits: ContactParameters,
+    same_storey: float = SAME_STOREY,
 ) -> tuple[float, TrackedObject | None]:
     """Largest share of a command with which the robot can stand before any contact, and what it would touch.
 
@@ -116,8 +127,10 @@ def safe_share(
     command : Twist
         What it is about to follow.
     objects : sequence of TrackedObject
-        Those that move count; all are of the same moment.
+        Those that move on the robot's storey count; all are of the same moment.
     limits : ContactParameters
+    same_storey : float
+        What is farther above or below [m] is on another storey.
 
     Returns
     -------
@@ -126,7 +139,7 @@ def safe_share(
     touched : TrackedObject or None
         What the robot would touch first with the whole command; None where the share is 1.
     """
-    near = moving_on_storey(objects, pose.z)
+    near = moving_on_storey(objects, pose.z, same_storey)
     if not near or command.is_stopped(1e-9, 1e-9):
         return 1.0, None
     touched = None

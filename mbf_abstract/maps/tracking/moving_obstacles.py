@@ -121,12 +121,20 @@ class MovingObstacles:
         with self._lock:
             return self._tracker.objects(now)
 
+    def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
+        """The tracked objects, and those that were cleared and may still be there."""
+        with self._lock:
+            return self._tracker.objects(now, cleared=True)
+
     def stale_reason(self, now: float, limit: float) -> str:
         """Which sensor is silent for longer than ``limit`` [s], or has sent nothing since a clearing."""
         return first_reason(watch.stale_reason(now, limit) for watch in self._watches.values())
 
     def clear(self, within: Callable[[FloatArray], NDArray[np.bool_]] | None = None) -> None:
-        """Forget the scans that wait and all objects, or those whose middles (n, 3) [m] are ``within`` an area."""
+        """Forget the scans that wait; hide all objects, or those whose middles (n, 3) [m] are ``within`` an area.
+
+        They are shown once they are seen again; until then, or until they are forgotten, the robot stops before them.
+        """
         self._waiting.clear()
         with self._lock:
             self._tracker.clear(within)

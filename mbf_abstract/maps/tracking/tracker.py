@@ -158,12 +158,14 @@ class Tracker:
         self._count = len(rows)
 
     def clear(self, within: Callable[[FloatArray], NDArray[np.bool_]] | None = None) -> None:
-        """Forget all objects, or those whose middles (n, 3) [m] are ``within`` an area."""
-        if within is None:
-            self._count = 0
-        else:
-            places = [states_of.X, states_of.Y, states_of.Z]
-            self._keep(~within(self._room[: self._count][:, places]))
+        """Hide all objects, or those whose middles (n, 3) [m] are ``within`` an area, until they are seen again.
+
+        A map that is cleared must not forget who moves: before somebody is known anew the robot would have touched
+        them. Those that are not seen again are forgotten as all others.
+        """
+        states = self._room[: self._count]
+        cleared = True if within is None else within(states[:, [states_of.X, states_of.Y, states_of.Z]])
+        states[:, states_of.CLEARED] = np.maximum(states[:, states_of.CLEARED], cleared)
 
     def are_moving(self, numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Mask (n,) of the numbers of objects that were moving in the last scan."""
@@ -172,9 +174,13 @@ class Tracker:
         moving = (states[:, states_of.HAS_MOVED] > 0.0) & (stood <= self.parameters.standing_time)
         return np.asarray(np.isin(numbers, self._numbers[: self._count][moving]))
 
-    def objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """The confirmed objects at ``now`` [s], the ones known for longest first; none that is unseen for too long."""
-        rows = np.flatnonzero(self._confirmed()).tolist()
+    def objects(self, now: float, *, cleared: bool = False) -> tuple[TrackedObject, ...]:
+        """The confirmed objects at ``now`` [s], the ones known for longest first; none that is unseen for too long.
+
+        Those that were cleared and not seen since are left out unless ``cleared`` asks for them, too.
+        """
+        shown = self._confirmed() & (cleared | (self._room[:, states_of.CLEARED] == 0.0))
+        rows = np.flatnonzero(shown).tolist()
         alike = (self._object(self._room[row].tolist(), int(self._numbers[row]), now) for row in rows)
         return tuple(known for known in alike if known.unseen <= self.parameters.forget_time)
 

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.tracking.avoidance import LOOK, AvoidanceParameters, MovingAround
-from mbf_abstract.maps.tracking.contact import RobotBox
+from mbf_abstract.maps.tracking.contact import SAME_STOREY, RobotBox
 from mbf_abstract.maps.tracking.kernels.meeting import NOBODY
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 
@@ -28,7 +28,7 @@ class Seeing:
     """A map on which these objects are known."""
 
     def __init__(self, box, *objects):
-        self.robot_box, self.objects = box, objects
+        self.robot_box, self.objects, self.same_storey = box, objects, SAME_STOREY
 
     def tracked_objects(self, now):
         return self.objects

@@ -8,9 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.layers.layer_list import LayerListError
+from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
+from mbf_abstract.maps.tracking.blocking import blockages
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.kernels.map.discs import raise_discs
@@ -82,6 +84,39 @@ def test_clear_forgets_objects_predictions_and_trails(hall, name):
     assert "'lidar' is in the map since it was cleared" in hall.map.layers["moving"].stale_reason(hall.now)
     hall.sees((x, y))
     assert hall.map.layers["moving"].stale_reason(hall.now) == ""
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_clearing_does_not_blind_the_guard(hall, whole):
+    """The robot stops before who was cleared as before, until that one is seen again or would be forgotten anyway."""
+    x, y = hall.watches(3.0, 4.0, 0.8, 0.0)
+    pose, ahead = Pose.planar(x + 0.6, y, math.pi), Twist.planar(0.4)
+
+    def share(now):
+        return hall.map.safe_share(pose, Twist(), ahead, now)[0]
+
+    assert share(hall.now) == 0.0
+    if whole:
+        hall.map.clear()
+    else:
+        hall.map.clear_area(Pose.planar(x, y), 2.0)
+    hall.map.update(Pose.planar(5.0, 1.0), hall.now)
+    assert hall.objects == () and share(hall.now) == 0.0
+    hall.sees((x + 0.08, y))
+    assert len(hall.objects) == 1 and share(hall.now) == 0.0
+    hall.map.clear()
+    assert share(hall.now + 0.9) == 0.0 and share(hall.now + 1.1) == 1.0
+
+
+def test_heights_count_only_on_maps_that_know_them(hall):
+    """A robot on the third storey of a building drives on the costmap of that storey, where nothing has a height."""
+    x, y = hall.watches(3.0, 4.0, 0.8, 0.0)
+    above = Pose((x + 0.8, y, 6.0), Pose.planar(0.0, 0.0, math.pi).orientation)
+    share, *_ = hall.map.safe_share(above, Twist(), Twist.planar(0.4), hall.now)
+    around = MovingAround.on(hall.map, above, hall.now, AvoidanceParameters())
+    path = Path.from_points(np.array([[x - 1.0, y, 6.0], [x + 1.0, y, 6.0]]))
+    on_it = blockages(hall.map.robot_box, path, hall.objects, 2.0, hall.map.same_storey)
+    assert (share < 1.0, around.anybody, bool(on_it)) == (hall.name == "costmap",) * 3
 
 
 @pytest.mark.parametrize("inside", [True, False])

@@ -238,13 +238,28 @@ def test_a_cloud_of_any_size_is_thinned_to_a_bounded_number_of_points():
     assert len(tracker.objects(0.3)) == 1
 
 
-def test_clear_forgets_everything_and_numbers_are_not_used_again():
+def test_who_was_cleared_is_hidden_until_seen_again_and_still_the_same_with_the_same_velocity():
     tracker, now = follow(walk(2.0, 0.0, 0.0, 0.8, 10))
+    (before,) = tracker.objects(now)
     tracker.clear()
+    assert tracker.objects(now) == () and tracker.objects(now, cleared=True) == (before,)
+    tracker.insert(disc(2.0, 0.8), SENSOR, now + PERIOD)
+    (again,) = tracker.objects(now + PERIOD)
+    assert again.number == before.number and again.motion is Motion.MOVING
+    assert again.vy == pytest.approx(0.8, abs=0.1)
+
+
+def test_who_was_cleared_and_is_not_seen_again_is_forgotten_and_numbers_are_not_used_again():
+    tracker, now = follow(walk(2.0, 0.0, 0.0, 0.8, 10))
+    tracker.clear(lambda places: places[:, 0] > 1.0)
+    tracker.clear(lambda places: places[:, 0] > 9.0)  # who is cleared stays it
     assert tracker.objects(now) == ()
-    for step in range(10, 15):
+    for step in range(10, 25):
+        tracker.insert(np.zeros((0, 3)), SENSOR, step * PERIOD)
+    assert len(tracker) == 0 and tracker.objects(2.4, cleared=True) == ()
+    for step in range(25, 30):
         tracker.insert(disc(2.0, 0.8), SENSOR, step * PERIOD)
-    assert [known.number for known in tracker.objects(1.4)] == [2]
+    assert [known.number for known in tracker.objects(2.9)] == [2]
 
 
 @given(st.integers(0, 2**32 - 1))

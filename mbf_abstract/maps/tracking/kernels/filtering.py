@@ -26,10 +26,11 @@ from mbf_abstract.maps.tracking.kernels.compiled import kernel
 FloatArray = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-STATE_COLUMNS = 17
+STATE_COLUMNS = 18
 X, Y, Z, VX, VY, VAR_POSITION, COVARIANCE, VAR_VELOCITY, HALF_X, HALF_Y = range(10)
-FIRST_SEEN, LAST_SEEN, SCANS, ANCHOR_X, ANCHOR_Y, ANCHOR_TIME, HAS_MOVED = range(10, STATE_COLUMNS)
-"""Columns of the state of an object. It stood at its anchor at ``ANCHOR_TIME`` [s]; ``HAS_MOVED`` is 0 or 1."""
+FIRST_SEEN, LAST_SEEN, SCANS, ANCHOR_X, ANCHOR_Y, ANCHOR_TIME, HAS_MOVED, CLEARED = range(10, STATE_COLUMNS)
+"""Columns of the state of an object. It stood at its anchor at ``ANCHOR_TIME`` [s]; ``HAS_MOVED`` is 0 or 1, and so is
+``CLEARED``: whether it was cleared and not seen since."""
 NOBODY = -1
 
 
@@ -154,6 +155,7 @@ def correct(
         state[Z] = box[MEAN_Z]
         state[LAST_SEEN] = stamp
         state[SCANS] += 1.0
+        state[CLEARED] = 0.0
 
 
 @kernel
