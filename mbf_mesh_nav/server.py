@@ -94,7 +94,7 @@ class MeshNavigationServer(MapServer):
         """The radius of the disc that stands for the robot; inflation layers have radii of their own."""
         if not isinstance(footprint, int | float):
             raise ValueError(f"a mesh map takes the robot for a disc: a radius [m], not {footprint!r}")
-        return {"inscribed_radius": footprint}
+        return {"inscribed_radius": footprint, "footprint": ()}
 
     def swap_mesh(self, mesh_file: Path | str) -> None:
         """Drive on another mesh from now on, e.g. after the lift; its layers are those of the configuration.

@@ -36,7 +36,7 @@ from mbf_abstract.maps.layers.layer_list import (
     layer_loader,
     plan_layers,
 )
-from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.files.map_header import read_map_header
 from mbf_mesh_nav.files.mesh_io import MAX_FACES, SPLIT_CORNERS, read_mesh
 from mbf_mesh_nav.map.height_error import with_height_error
@@ -45,6 +45,7 @@ from mbf_mesh_nav.map.layer_cache import LayerCache
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.map_findings import frame_findings, header_findings, map_findings
 from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.robot_outline import OutlineParameters
 from mbf_mesh_nav.mesh.densify import densify
 from mbf_mesh_nav.mesh.mesh_report import Finding
 from mbf_mesh_nav.mesh.repair import REPAIRS, checked_mesh
@@ -64,7 +65,7 @@ class MeshLayerEntry(LayerEntry):
         return self.inputs
 
 
-class MeshMapParameters(ParameterModel):
+class MeshMapParameters(OutlineParameters):
     """Parameters of the ``mesh_map`` block, beside the blocks of the layers."""
 
     mesh_file: str = parameter("", "File of the mesh; empty if the mesh is given as arrays.", dynamic=False)
@@ -200,7 +201,7 @@ def build_mesh_map(
     if parameters.densify > 0.0:
         mesh = densify(mesh, parameters.densify, file=file or "arrays")
     mesh_map = MeshMap(build_topology(mesh), frame_id, report, parameters.inscribed_radius)
-    mesh_map.max_turning_slope = parameters.max_turning_slope
+    mesh_map.footprint, mesh_map.max_turning_slope = parameters.footprint, parameters.max_turning_slope
     if plan:
         plan = [replace(one, parameters=with_height_error(one.parameters, height_error_of(file))) for one in plan]
         graph = compute_layers(mesh_map, plan, parameters.cache_dir)

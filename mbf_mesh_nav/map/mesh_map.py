@@ -14,20 +14,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
 from mbf_mesh_nav.map.places import MeshPlaces
+from mbf_mesh_nav.map.robot_outline import OutlinedMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot, SnapshotSeries
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
 from mbf_mesh_nav.mesh.mesh_report import MeshReport
-from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE, UNKNOWN_RADIUS, forbidden_ahead, nearest_of, slope_at
+from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE, UNKNOWN_RADIUS, forbidden_ahead, nearest_of
 from mbf_mesh_nav.mesh.repair import checked_mesh
 from mbf_mesh_nav.mesh.topology import MeshTopology, build_topology
+from mbf_mesh_nav.mesh.turning import pivots, slope_at, swept_obstacle
 
 if TYPE_CHECKING:
     import networkx
@@ -38,7 +39,7 @@ REMEMBERED_CHANGES = 100
 """Number of changes of the default layer a planner may have missed and still repair its last result."""
 
 
-class MeshMap(LayeredMap):
+class MeshMap(OutlinedMap):
     """A triangle mesh with layers. Construct it with ``from_arrays``, ``from_heights`` or ``map_builder``.
 
     Attributes
@@ -55,6 +56,9 @@ class MeshMap(LayeredMap):
         Frame of all coordinates.
     inscribed_radius : float
         Radius [m] of the disc that stands for the robot when the server is asked where it fits.
+    footprint : tuple of (x, y)
+        Corners [m] of the robot's outline, for turns on the spot and for contacts with moving objects; empty = that
+        disc.
     max_turning_slope : float
         Steeper ground [rad] is not turned on in a recovery.
     """
@@ -288,21 +292,28 @@ class MeshMap(LayeredMap):
         return self.places().find_valid_pose(pose, dist_tolerance, query)
 
     def take_parameters(self, parameters: Any) -> None:
-        """Take over ``edge_cost_factor`` and ``inscribed_radius`` of ``MeshMapParameters``."""
+        """Take over ``edge_cost_factor``, ``inscribed_radius`` and ``footprint`` of ``MeshMapParameters``."""
         if parameters.edge_cost_factor != self.edge_cost_factor:
             self.set_edge_cost_factor(parameters.edge_cost_factor)
-        self.inscribed_radius = parameters.inscribed_radius
+        self.inscribed_radius, self.footprint = parameters.inscribed_radius, parameters.footprint
 
     # -------------------------------------------------------------------------------------------------- motion
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
-        """Where the robot would come onto forbidden ground or past a border, or that it is too steep to turn."""
+        """Where the robot would come onto forbidden ground or past a border, or that it is too steep to turn.
+
+        A motion that turns about a place within the robot's outline is a turn on the spot, even if it creeps.
+        """
         place = self.locate_one(pose.position, SURFACE_DISTANCE)
         if place is None:
             return f"the robot is more than {SURFACE_DISTANCE:g} m from the surface"
-        turns = command.speed == 0.0 and command.wz != 0.0
+        turns = pivots(command, self.robot_reach)
         if turns and (slope := slope_at(self.topology, place)) > self.max_turning_slope:
             return f"the ground slopes {slope:.2f} rad, turning is allowed up to {self.max_turning_slope:g} rad"
         ranks = self.snapshot().traversability_rank(FORBIDDEN_COST)
+        if turns and self.footprint:
+            swept = swept_obstacle(self.topology, ranks, place, pose, command, duration, self.footprint)
+            if swept:
+                return swept
         radius = self.inscribed_radius or UNKNOWN_RADIUS
         return forbidden_ahead(self.topology, ranks, place, pose, command, duration, radius)
 

@@ -3,12 +3,10 @@
 The robot's centre is walked over the surface along the arc of its command, and on by its radius in the direction it
 then has. Forbidden surface ends the motion, and so does a border; a robot that stands on forbidden
 surface may leave it, see ``kernels.search.forbidden_surface``. What its sides would touch is in the costs: on a map
-that is not inflated only what lies straight ahead counts. Turning on the spot tips or slides a robot on a steep slope.
+that is not inflated only what lies straight ahead counts. What turns on the spot is checked in ``turning``, too.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -27,11 +25,6 @@ UNKNOWN_RADIUS = 0.3
 """Radius [m] of a robot whose inscribed radius the map does not know."""
 STRIDE = 0.05
 """Length [m] of the steps of a walk."""
-
-
-def slope_at(mesh: MeshTopology, place: SurfacePoint) -> float:
-    """Inclination [rad] of the face at a place; 0 = level."""
-    return math.acos(min(max(float(mesh.face_normals[place.face, 2]), -1.0), 1.0))
 
 
 def forbidden_ahead(

@@ -120,8 +120,8 @@ class TiledNavigationMap(TileQuestions):
             yield
 
     def take_parameters(self, parameters: Any) -> None:
-        """Take over ``inscribed_radius``."""
-        self._radius = parameters.inscribed_radius
+        """Take over ``inscribed_radius`` and ``footprint``."""
+        self._radius, self.footprint = parameters.inscribed_radius, parameters.footprint
 
     def moment(self) -> Moment:
         """The map as it is now."""
@@ -198,7 +198,8 @@ class TiledNavigationMap(TileQuestions):
     # ---------------------------------------------------------------------------------------------- surroundings
     def _for_robot(self, mesh_map: MeshMap) -> MeshMap:
         """A part of the map with the robot's figures of now."""
-        mesh_map.inscribed_radius, mesh_map.max_turning_slope = self.inscribed_radius, self._max_turning_slope
+        mesh_map.inscribed_radius, mesh_map.footprint = self.inscribed_radius, self.footprint
+        mesh_map.max_turning_slope = self._max_turning_slope
         return mesh_map
 
     def _picture(self, layer: str) -> GridView:

@@ -8,23 +8,22 @@ from abc import abstractmethod
 import numpy as np
 
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.places import OUTSIDE
 from mbf_mesh_nav.map.places import SURFACE_DISTANCE as OF_PLACES
+from mbf_mesh_nav.map.robot_outline import OutlinedMap
 from mbf_mesh_nav.mesh.ground import ground_heights
 from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE as OF_ROBOTS
-from mbf_mesh_nav.mesh.motion_check import UNKNOWN_RADIUS
 from mbf_mesh_nav.tiles.serving.moment import Moment
 
 SEARCHED = 128.0
 """A pose where the robot fits is looked for so far away, in distances between vertices."""
 
 
-class TileQuestions(LayeredMap):
+class TileQuestions(OutlinedMap):
     """What every map of tiles answers."""
 
     @property
@@ -128,7 +127,7 @@ class TileQuestions(LayeredMap):
 
         A motion that leads farther than ``reach`` is an obstacle.
         """
-        radius = OF_ROBOTS + command.speed * duration + (self.inscribed_radius or UNKNOWN_RADIUS)
+        radius = OF_ROBOTS + command.speed * duration + self.robot_reach
         if radius > self.reach:
             return f"the motion needs {radius:.4g} m of the map of tiles around the robot, the limit is {self._limit}"
         there = self.around(pose.x, pose.y, radius)

@@ -30,6 +30,7 @@ from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.server.plugin_host import ServerError
 from mbf_mesh_nav.map.map_builder import MeshLayerEntry
 from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.robot_outline import OutlineParameters
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.plugins import MeshController, MeshPlugin, MeshRecovery, MeshRefiner
 from mbf_mesh_nav.tiles.index import is_tile_folder, read_index
@@ -63,7 +64,7 @@ ON_TILES: Mapping[type[MeshPlugin], Any] = {
 """What gives plugins for one mesh the part of the tiles that they need."""
 
 
-class TiledMapParameters(ParameterModel):
+class TiledMapParameters(OutlineParameters):
     """Parameters of the ``tiled_map`` block."""
 
     folder: str = parameter(..., "Folder of the tiles, as `mbf map tile` writes it.", dynamic=False)
@@ -132,6 +133,7 @@ class TileServer(MapServer):
             raise MeshError(str(folder), [text])
         window = self._window(config, parameters, tiled)
         tiled_map = TiledNavigationMap(tiled, parameters.inscribed_radius, parameters.max_turning_slope, window)
+        tiled_map.footprint = parameters.footprint
         yield ServedMap(tiled_map, self.runtime, "tiled_map", parameters, parameters.update_frequency)
 
     def _window(self, config: Config, parameters: TiledMapParameters, tiled: TiledMap) -> WindowSettings:
@@ -157,7 +159,7 @@ class TileServer(MapServer):
         """The radius of the disc that stands for the robot; the map's layers keep theirs."""
         if not isinstance(footprint, int | float):
             raise ValueError(f"a mesh map takes the robot for a disc: a radius [m], not {footprint!r}")
-        return {"inscribed_radius": footprint}
+        return {"inscribed_radius": footprint, "footprint": ()}
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add the map."""

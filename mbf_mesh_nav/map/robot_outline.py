@@ -1,0 +1,59 @@
+"""The robot's outline on maps of a surface: a disc for places and plans, its corners for turns and contacts."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import field_validator
+
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.maps.layered_map import LayeredMap
+from mbf_abstract.maps.tracking.contact import RobotBox
+from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_mesh_nav.mesh.motion_check import UNKNOWN_RADIUS
+
+Corners = tuple[tuple[float, float], ...]
+"""Of an outline in the robot's frame [m]: x forward, y left; empty = unknown."""
+
+
+class OutlineParameters(ParameterModel):
+    """Part of the parameters of such a map."""
+
+    footprint: Corners = parameter(
+        (),
+        "Corners of the robot's outline, x forward and y left, for turns on the spot and for contacts with what moves; "
+        "empty = the disc of inscribed_radius, as for plans.",
+        unit="m",
+    )
+
+    @field_validator("footprint")
+    @classmethod
+    def _footprint_holds_the_origin(cls, corners: Corners) -> Corners:
+        if not corners:
+            return corners
+        if len(corners) < 3:
+            raise ValueError(f"at least three corners [x, y], or none, got {len(corners)}")
+        if (np.min(corners, axis=0) >= 0.0).any() or (np.max(corners, axis=0) <= 0.0).any():
+            raise ValueError("corners on all sides of the robot's origin (0, 0)")
+        return corners
+
+
+class OutlinedMap(LayeredMap):
+    """A map that knows the outline of its robot.
+
+    Attributes
+    ----------
+    footprint : tuple of (x, y)
+        Corners [m] of the robot's outline; empty = the disc of the inscribed radius.
+    """
+
+    footprint: Corners = ()
+
+    @property
+    def robot_box(self) -> RobotBox:
+        """The box around the footprint; the disc if there is none."""
+        return RobotBox.around(self.footprint) if self.footprint else super().robot_box
+
+    @property
+    def robot_reach(self) -> float:
+        """How far [m] the robot reaches from its origin: its outline, else its disc, else that of an unknown robot."""
+        return float(norm(self.footprint).max()) if self.footprint else self.inscribed_radius or UNKNOWN_RADIUS
