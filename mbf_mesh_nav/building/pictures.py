@@ -17,7 +17,7 @@ Pixels = NDArray[np.uint8]
 MOST_PIXELS = 900
 LEAST_PIXELS = 400
 EMPTY, GREY = (255, 255, 255), (205, 208, 212)
-RED, ORANGE, BLUE, PURPLE, DARK = (200, 40, 40), (235, 150, 40), (60, 120, 220), (150, 80, 190), (20, 20, 20)
+RED, ORANGE, BLUE, DARK = (200, 40, 40), (235, 150, 40), (60, 120, 220), (20, 20, 20)
 LOW, MIDDLE, HIGH = (52, 94, 141), (245, 240, 220), (166, 70, 46)
 """Ends and middle of the scale of colours."""
 

@@ -1,4 +1,4 @@
-"""The HDF5 files of lvr2 and mesh_navigation, both of their layouts read and written.
+"""The HDF5 files of lvr2 and mesh_navigation: meshes read from both layouts, maps written in both.
 
 ``mesh_io``, the present one: ``<part>/geometry/vertices`` (V, 3) float32 and ``<part>/geometry/face_indices`` (F, 3)
 uint32, per-vertex attributes such as layer costs below ``<part>/vertex_attributes``. ``channels``, of lvr2 before
@@ -10,7 +10,6 @@ does not say which parameters made it.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.whole_files import replacing
-from mbf_mesh_nav.arrays import Float32Array, FloatArray
+from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
@@ -32,7 +31,6 @@ LAYOUTS: dict[str, tuple[str, str]] = {
 """Groups below a part that hold its geometry and its per-vertex attributes."""
 GEOMETRY_CHANNELS = {"vertices": "fiu", "face_indices": "iu"}
 """Channels of the geometry and the kinds of numbers they may hold."""
-MAX_ATTRIBUTE_BYTES = 4 * 2**30
 
 
 def read_lvr2_mesh(path: Path, part: str, max_faces: int) -> tuple[FloatArray, NDArray[np.int64]]:
@@ -51,40 +49,6 @@ def read_lvr2_mesh(path: Path, part: str, max_faces: int) -> tuple[FloatArray, N
         if vertices.shape[0] > 3 * max_faces:
             raise MeshError(str(path), [f"{vertices.shape[0]} vertices, the limit is {3 * max_faces} (3 max_faces)"])
         return vertices[()].astype(np.float64), faces[()].astype(np.int64)
-
-
-def read_lvr2_vertex_attributes(
-    path: Path, part: str = "", max_bytes: int = MAX_ATTRIBUTE_BYTES
-) -> dict[str, Float32Array]:
-    """Read all per-vertex numbers of a part, e.g. costs that mesh_navigation saved, in the file's numbering.
-
-    Parameters
-    ----------
-    max_bytes : int
-        Limit on what all of them take as float32; with more, the file is refused.
-
-    Returns
-    -------
-    dict
-        Name -> (V,) or (V, n) float32.
-
-    Raises
-    ------
-    MeshError
-        As ``read_lvr2_mesh``.
-    """
-    with _opened(path) as file:
-        geometry = _geometry(file, path, part.strip("/"))
-        count = geometry["vertices"].shape[0]
-        groups = [geometry.parent[name] for _, name in LAYOUTS.values() if name in geometry.parent]
-        found = {
-            name: values
-            for name, values in (groups[0].items() if groups else ())
-            if name not in GEOMETRY_CHANNELS and _is_numbers(values, "fiub") and values.shape[:1] == (count,)
-        }
-        if (size := sum(4 * math.prod(values.shape) for values in found.values())) > max_bytes:
-            raise MeshError(str(path), [f"its attributes take {size} bytes, the limit is {max_bytes}"])
-        return {name: _without_last_axis(values[()].astype(np.float32)) for name, values in found.items()}
 
 
 def write_lvr2_mesh(
@@ -219,8 +183,3 @@ def _wrong_channel(geometry: Any, name: str, kinds: str) -> str:
 
 def _is_numbers(item: Any, kinds: str) -> bool:
     return isinstance(item, h5py.Dataset) and item.shape is not None and item.dtype.kind in kinds
-
-
-def _without_last_axis(values: Float32Array) -> Float32Array:
-    """(V, 1) as (V,), anything else as it is."""
-    return values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values

@@ -125,11 +125,6 @@ def pose_of(message: Mapping[str, Any], context: MessageContext, where: str = "p
         raise InvalidValueError(f"{where}: {error}") from error
 
 
-def optional_pose_of(message: Mapping[str, Any], context: MessageContext) -> Pose | None:
-    """Return the pose of a PoseStamped in an answer; None where it names no frame, see ``pose_stamped``."""
-    return pose_of(message, context) if message["header"]["frame_id"] else None
-
-
 def path_message(value: Path | None, context: MessageContext) -> Message:
     """Return a nav_msgs/Path; without poses where there is no path."""
     if value is None:

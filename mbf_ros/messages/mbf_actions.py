@@ -1,13 +1,9 @@
-"""The four actions of mbf_msgs: goals, results and feedback, to messages and back.
+"""The four actions of mbf_msgs: goals of messages, and the messages of results and feedback.
 
-Their outcome codes are ours. What a message has no field for is not left out silently: making the message of such a
-goal raises MessageError. A result or a feedback that comes back from a message has none of our additional fields.
+Their outcome codes are ours. Fields of ours that a message has no place for are left out.
 """
 
 from __future__ import annotations
-
-import math
-from typing import Any
 
 from mbf_abstract.goals.goal_types import (
     ExePathFeedback,
@@ -22,44 +18,11 @@ from mbf_abstract.goals.goal_types import (
 )
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_ros.messages.action_mapping import ActionMapping, path_or_refuse, pose_or_refuse
-from mbf_ros.messages.geometry import (
-    MessageContext,
-    command_twist,
-    optional_pose_of,
-    path_message,
-    path_of,
-    pose_of,
-    pose_stamped,
-    twist_of,
-    twist_stamped,
-)
-from mbf_ros.messages.interfaces import Message, MessageError
-
-
-def _refuse_unsaid(kind: str, **fields: object) -> None:
-    """Raise where a goal has a value that the message cannot carry."""
-    for name, value in fields.items():
-        if value:
-            raise MessageError(f"{kind} has no field for {name}, which is {value!r}")
+from mbf_ros.messages.geometry import MessageContext, command_twist, path_message, pose_stamped, twist_stamped
+from mbf_ros.messages.interfaces import Message
 
 
 # ------------------------------------------------------------------------------------------------------- get_path
-def get_path_goal(goal: GetPathGoal, context: MessageContext) -> Message:
-    """Return a GetPath_Goal; raises MessageError where it cannot carry the goal."""
-    kind = "mbf_msgs/action/GetPath"
-    _refuse_unsaid(kind, via=goal.via, goal_area=goal.goal_area, angle_tolerance=goal.angle_tolerance)
-    if goal.dist_tolerance is None:
-        raise MessageError(f"{kind} needs a tolerance: it cannot ask for the server's (dist_tolerance None)")
-    return {
-        "use_start_pose": goal.start_pose is not None,
-        "start_pose": pose_stamped(goal.start_pose, context),
-        "target_pose": pose_stamped(goal.target_pose, context),
-        "tolerance": goal.dist_tolerance,
-        "planner": goal.planner,
-        "concurrency_slot": goal.concurrency_slot,
-    }
-
-
 def get_path_goal_of(message: Message, context: MessageContext) -> GetPathGoal:
     """Return the goal of a GetPath_Goal; raises RefusedGoal with INVALID_GOAL or INVALID_START."""
     has_start = message["use_start_pose"]
@@ -78,29 +41,7 @@ def get_path_result(result: GetPathResult, context: MessageContext) -> Message:
     return {"outcome": result.outcome, "message": result.message, "path": path, "cost": result.cost}
 
 
-def get_path_result_of(message: Message, context: MessageContext) -> GetPathResult:
-    """Return the result of a GetPath_Result."""
-    path = path_of(message["path"], context) if message["path"]["poses"] else None
-    return GetPathResult(message["outcome"], message["message"], path, message["cost"])
-
-
 # ------------------------------------------------------------------------------------------------------- exe_path
-def exe_path_goal(goal: ExePathGoal, context: MessageContext) -> Message:
-    """Return an ExePath_Goal; raises MessageError where it cannot carry the goal."""
-    kind, tolerances = "mbf_msgs/action/ExePath", (goal.dist_tolerance, goal.angle_tolerance)
-    _refuse_unsaid(kind, goal_area=goal.goal_area)
-    if (tolerances[0] is None) != (tolerances[1] is None):
-        raise MessageError(f"{kind} has both tolerances or none, got dist_tolerance and angle_tolerance {tolerances}")
-    return {
-        "path": path_message(goal.path, context),
-        "controller": goal.controller,
-        "concurrency_slot": goal.concurrency_slot,
-        "tolerance_from_action": tolerances[0] is not None,
-        "dist_tolerance": tolerances[0] or 0.0,
-        "angle_tolerance": tolerances[1] or 0.0,
-    }
-
-
 def exe_path_goal_of(message: Message, context: MessageContext) -> ExePathGoal:
     """Return the goal of an ExePath_Goal; raises RefusedGoal with INVALID_PATH."""
     own = message["tolerance_from_action"]
@@ -124,26 +65,6 @@ def driving_result(result: ExePathResult | MoveBaseResult, context: MessageConte
     }
 
 
-def _driving_fields(message: Message, context: MessageContext) -> dict[str, Any]:
-    return {
-        "outcome": message["outcome"],
-        "message": message["message"],
-        "final_pose": optional_pose_of(message["final_pose"], context),
-        "dist_to_goal": _or_infinite(message["dist_to_goal"]),
-        "angle_to_goal": _or_infinite(message["angle_to_goal"]),
-    }
-
-
-def _or_infinite(number: float) -> float:
-    """Infinity where JSON had null for it."""
-    return math.inf if math.isnan(number) else number
-
-
-def exe_path_result_of(message: Message, context: MessageContext) -> ExePathResult:
-    """Return the result of an ExePath_Result."""
-    return ExePathResult(**_driving_fields(message, context))
-
-
 def driving_feedback(feedback: ExePathFeedback, context: MessageContext) -> Message:
     """Return an ExePath_Feedback or a MoveBase_Feedback; a command of a car as in ``command_twist``."""
     command, pose = command_twist(feedback.last_command), feedback.current_pose
@@ -157,26 +78,7 @@ def driving_feedback(feedback: ExePathFeedback, context: MessageContext) -> Mess
     }
 
 
-def driving_feedback_of(message: Message, context: MessageContext) -> ExePathFeedback:
-    """Return the feedback of an ExePath_Feedback or a MoveBase_Feedback."""
-    return ExePathFeedback(
-        outcome=message["outcome"],
-        message=message["message"],
-        current_pose=pose_of(message["current_pose"], context),
-        dist_to_goal=_or_infinite(message["dist_to_goal"]),
-        angle_to_goal=_or_infinite(message["angle_to_goal"]),
-        distance_along_path=math.nan,
-        time_to_goal=math.inf,
-        last_command=twist_of(message["last_cmd_vel"]["twist"]),
-    )
-
-
 # ----------------------------------------------------------------------------------------------- recovery, move_base
-def recovery_goal(goal: RecoveryGoal, context: MessageContext) -> Message:
-    """Return a Recovery_Goal."""
-    return {"behavior": goal.behavior, "concurrency_slot": goal.concurrency_slot}
-
-
 def recovery_goal_of(message: Message, context: MessageContext) -> RecoveryGoal:
     """Return the goal of a Recovery_Goal."""
     return RecoveryGoal(message["behavior"], message["concurrency_slot"])
@@ -187,25 +89,6 @@ def recovery_result(result: RecoveryResultMessage, context: MessageContext) -> M
     return {"outcome": result.outcome, "message": result.message, "used_plugin": result.used_plugin}
 
 
-def recovery_result_of(message: Message, context: MessageContext) -> RecoveryResultMessage:
-    """Return the result of a Recovery_Result."""
-    return RecoveryResultMessage(message["outcome"], message["message"], message["used_plugin"])
-
-
-def move_base_goal(goal: MoveBaseGoal, context: MessageContext) -> Message:
-    """Return a MoveBase_Goal; raises MessageError where it cannot carry the goal."""
-    tolerances = {"dist_tolerance": goal.dist_tolerance, "angle_tolerance": goal.angle_tolerance}
-    _refuse_unsaid("mbf_msgs/action/MoveBase", via=goal.via, goal_area=goal.goal_area, **tolerances)
-    if goal.recovery_behaviors == ():
-        raise MessageError("mbf_msgs/action/MoveBase cannot ask for no recovery at all: an empty list means all")
-    return {
-        "target_pose": pose_stamped(goal.target_pose, context),
-        "controller": goal.controller,
-        "planner": goal.planner,
-        "recovery_behaviors": list(goal.recovery_behaviors or ()),
-    }
-
-
 def move_base_goal_of(message: Message, context: MessageContext) -> MoveBaseGoal:
     """Return the goal of a MoveBase_Goal; raises RefusedGoal with INVALID_GOAL."""
     return MoveBaseGoal(
@@ -214,11 +97,6 @@ def move_base_goal_of(message: Message, context: MessageContext) -> MoveBaseGoal
         controller=message["controller"],
         recovery_behaviors=tuple(message["recovery_behaviors"]) or None,
     )
-
-
-def move_base_result_of(message: Message, context: MessageContext) -> MoveBaseResult:
-    """Return the result of a MoveBase_Result."""
-    return MoveBaseResult(**_driving_fields(message, context))
 
 
 GET_PATH = ActionMapping("mbf_msgs/action/GetPath", get_path_goal_of, get_path_result, None, GetPathResult)

@@ -41,13 +41,6 @@ CAMERA_SETBACK = 0.85
 LEAST_HOLD = 2.0  # s that a scan is shown
 
 
-def add_world(scene: Scene, recording: Recording) -> None:
-    """Add what does not move: light, ground, walls, obstacles, start and goals."""
-    if recording.ground is not None:
-        add_ground(scene, recording.ground)
-    add_surroundings(scene, recording)
-
-
 def add_surroundings(scene: Scene, recording: Recording) -> None:
     """Add what does not move apart from the ground."""
     add_solids(scene, recording)

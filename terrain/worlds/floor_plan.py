@@ -1,7 +1,8 @@
 """Draw a map from a short floor plan: rooms as rectangles of walls, doors as gaps, furniture.
 
-``OFFICE_MAP`` is the floor that ships with the package; ``write_office_map`` makes its map_server files anew after a
-change of ``data/office.plan.yaml``. For real buildings read their map with ``terrain.worlds.occupancy.read_occupancy``.
+``OFFICE_MAP`` is the floor that ships with the package; after a change of ``data/office.plan.yaml`` its files are made
+anew by ``write_map(read_floor_plan().draw(), DATA_FOLDER, "office")``. For real buildings read their map with
+``terrain.worlds.occupancy.read_occupancy``.
 """
 
 from __future__ import annotations
@@ -148,8 +149,3 @@ def write_map(grid: OccupancyGrid, folder: str | Path, name: str) -> Path:
     pixels[grid.free] = PIXEL_FREE
     pixels[grid.occupied] = PIXEL_OCCUPIED
     return write_map_files(Path(folder) / name, pixels, grid)
-
-
-def write_office_map(folder: str | Path) -> Path:
-    """Draw the office that ships with the package into ``folder``; return the path of ``office.yaml``."""
-    return write_map(read_floor_plan().draw(), folder, "office")

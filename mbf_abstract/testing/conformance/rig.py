@@ -21,8 +21,6 @@ from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_abstract.time.clock import Priority
 
-GROUND_X, GROUND_Y = 12.0, 8.0
-"""The ground is flat, empty and known from (0, 0) to here [m]; beyond is none."""
 ROBOT_RADIUS = 0.3
 """Radius of the robot [m]."""
 SENSOR = "lidar"

@@ -45,7 +45,7 @@ from mbf_mesh_nav.kernels.wave.bucket_queue import (
 from mbf_mesh_nav.kernels.wave.fronts import NO_BEND, distance_where_fronts_meet, is_obtuse, unfolded_distance
 
 ALONG_EDGE = -1
-_FREE, _BLOCKED, _SETTLED = 0, 1, 3
+_FREE, _SETTLED = 0, 3
 _ONE_FREE, _ALL_SETTLED = 3, 6  # sums of the states of the two other corners; no other pairs have them
 _ZERO: Any = np.float32(0)
 NEAR_STEPS: Any = np.float32(10)  # typical edges from the source up to which all corners are asked for two fronts
@@ -104,7 +104,7 @@ def propagate_wave(
         Number of settled vertices, -1 if cancelled.
     """
     # 1. The queue (see ``bucket_queue.py``). A record adds one entry, three with edges; what is taken again none.
-    state = blocked.astype(np.uint8)  # _FREE or _BLOCKED
+    state = blocked.astype(np.uint8)  # _FREE, or 1 where it is blocked
     room = (3 if along_edges else 1) * len(corner_ends) + len(seeds)
     heads, links = np.full(RING, EMPTY, dtype=np.int32), np.empty(room, dtype=np.int32)
     entries, near = np.empty(room, dtype=np.uint64), np.empty(room, dtype=np.uint64)

@@ -4,13 +4,18 @@ import h5py
 import numpy as np
 import pytest
 
-from mbf_mesh_nav.files.lvr2_io import LAYOUTS, read_lvr2_vertex_attributes, write_lvr2_map, write_lvr2_mesh
+from mbf_mesh_nav.files.lvr2_io import LAYOUTS, write_lvr2_map, write_lvr2_mesh
 from mbf_mesh_nav.files.mesh_io import read_mesh
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.repair import MeshError
 
 VERTICES, FACES = heightfield_mesh(np.random.default_rng(0).random((12, 10)) * 0.1, 0.1, 0.1)
+
+
+def stored(file, name):
+    with h5py.File(file) as opened:
+        return opened[name][()]
 
 
 @pytest.mark.parametrize("layout", list(LAYOUTS))
@@ -23,9 +28,9 @@ def test_both_layouts_are_read_back_as_written_with_layer_costs(tmp_path, layout
     vertices, faces = read_mesh(file)
     np.testing.assert_allclose(vertices, VERTICES, atol=1e-6)
     np.testing.assert_array_equal(faces, FACES)
-    attributes = read_lvr2_vertex_attributes(file)
-    np.testing.assert_array_equal(attributes["height_diff"], costs)
-    assert attributes["vertex_normals"].shape == (len(VERTICES), 3)
+    group = f"site/mesh/{LAYOUTS[layout][1]}"
+    np.testing.assert_array_equal(stored(file, f"{group}/height_diff")[:, 0], costs)
+    assert stored(file, f"{group}/vertex_normals").shape == (len(VERTICES), 3)
     with pytest.raises(MeshError, match="not overwritten"):
         write_lvr2_mesh(file, VERTICES, FACES)
 
@@ -41,8 +46,8 @@ def test_map_is_saved_with_its_layers_in_the_callers_numbering(tmp_path):
     vertices, faces = read_mesh(tmp_path / "map.h5")
     np.testing.assert_allclose(vertices, shuffled, atol=1e-6)
     assert {tuple(sorted(face)) for face in faces.tolist()} == {tuple(sorted(face)) for face in corners.tolist()}
-    stored = read_lvr2_vertex_attributes(tmp_path / "map.h5")["rough"]
-    np.testing.assert_array_equal(stored, mesh.to_input_order(mesh.layers["rough"].costs).astype(np.float32))
+    rough = stored(tmp_path / "map.h5", "mesh/vertex_attributes/rough")[:, 0]
+    np.testing.assert_array_equal(rough, mesh.to_input_order(mesh.layers["rough"].costs).astype(np.float32))
 
 
 def test_a_layer_whose_costs_the_normals_would_replace_is_refused(tmp_path):
@@ -58,10 +63,8 @@ def test_old_layout_is_read(tmp_path):
     with h5py.File(file, "w") as handle:
         handle["mesh/channels/vertices"] = VERTICES.astype(np.float32)
         handle["mesh/channels/face_indices"] = FACES.astype(np.uint32)
-        handle["mesh/channels/roughness"] = np.ones((len(VERTICES), 1), np.float32)
 
     np.testing.assert_array_equal(read_mesh(file, "mesh")[1], FACES)
-    assert read_lvr2_vertex_attributes(file)["roughness"].shape == (len(VERTICES),)
 
 
 def test_hdf5_without_or_with_another_mesh_names_what_is_there(tmp_path):
@@ -132,27 +135,9 @@ def fractions_for_indices(file):
         (fractions_for_indices, "/mesh/channels/face_indices holds float32, expected integers"),
     ],
 )
-def test_channels_that_are_no_numbers_are_refused_by_both_readers(tmp_path, fill, text):
+def test_channels_that_are_no_numbers_are_refused(tmp_path, fill, text):
     path = tmp_path / "odd.h5"
     with h5py.File(path, "w") as file:
         fill(file)
-    for read in (read_mesh, read_lvr2_vertex_attributes):
-        with pytest.raises(MeshError, match=text):
-            read(path)
-
-
-def test_attributes_that_are_no_numbers_are_passed_over(tmp_path):
-    write_lvr2_mesh(tmp_path / "map.h5", VERTICES, FACES, {"rough": np.ones(len(VERTICES))})
-    with h5py.File(tmp_path / "map.h5", "a") as file:
-        file["mesh/vertex_attributes/names"] = np.array([b"a"] * len(VERTICES))
-        file.create_group("mesh/vertex_attributes/more")
-        file["mesh"].attrs["IO"] = np.array([b"MeshIO"])
-    assert set(read_lvr2_vertex_attributes(tmp_path / "map.h5")) == {"rough"}
-
-
-@pytest.mark.parametrize("content", [b"not hdf5", None])
-def test_attributes_of_a_file_that_is_none_are_refused_like_its_mesh(tmp_path, content):
-    if content:
-        (tmp_path / "bad.h5").write_bytes(content)
-    with pytest.raises(MeshError, match="cannot be read as HDF5"):
-        read_lvr2_vertex_attributes(tmp_path / "bad.h5")
+    with pytest.raises(MeshError, match=text):
+        read_mesh(path)

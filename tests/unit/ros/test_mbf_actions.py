@@ -1,4 +1,4 @@
-"""Goals, results and feedback of mbf_msgs survive the way through JSON and back; what means nothing is refused."""
+"""Goals, results and feedback of mbf_msgs pass through JSON unchanged; what means nothing is refused."""
 
 import json
 import math
@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
-from mbf_abstract.goals.goal_area import DiscArea
 from mbf_abstract.goals.goal_types import (
     ExePathFeedback,
     ExePathGoal,
@@ -25,8 +24,8 @@ from mbf_abstract.goals.goal_types import (
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_ros.messages import mbf_actions as mbf
 from mbf_ros.messages.action_mapping import RefusedGoal
-from mbf_ros.messages.geometry import MessageContext
-from mbf_ros.messages.interfaces import MessageError, completed, fields_of, json_text
+from mbf_ros.messages.geometry import MessageContext, path_message, path_of, pose_of, pose_stamped, twist_of
+from mbf_ros.messages.interfaces import completed, fields_of, json_text
 
 CONTEXT = MessageContext("map", epoch=1_700_000_000.0)
 
@@ -86,24 +85,38 @@ def through_json(message, type_name):
         concurrency_slot=slots,
     )
 )
-def test_a_get_path_goal_comes_back_as_it_was(goal):
-    message = through_json(mbf.get_path_goal(goal, CONTEXT), "mbf_msgs/action/GetPath_Goal")
-    assert mbf.get_path_goal_of(message, CONTEXT) == goal
+def test_a_get_path_goal_is_what_its_client_asked_for(goal):
+    sent = {
+        "use_start_pose": goal.start_pose is not None,
+        "start_pose": pose_stamped(goal.start_pose, CONTEXT),
+        "target_pose": pose_stamped(goal.target_pose, CONTEXT),
+        "tolerance": goal.dist_tolerance,
+        "planner": goal.planner,
+        "concurrency_slot": goal.concurrency_slot,
+    }
+    assert mbf.get_path_goal_of(through_json(sent, "mbf_msgs/action/GetPath_Goal"), CONTEXT) == goal
 
 
 @given(paths(), names, st.none() | st.tuples(tolerances, tolerances), slots)
-def test_an_exe_path_goal_comes_back_as_it_was(path, controller, tolerances, slot):
-    goal = ExePathGoal(path, controller, *(tolerances or (None, None)), concurrency_slot=slot)
-    message = through_json(mbf.exe_path_goal(goal, CONTEXT), "mbf_msgs/action/ExePath_Goal")
-    back = mbf.exe_path_goal_of(message, CONTEXT)
-    assert same_path(back.path, path)
-    assert replace(back, path=path) == goal
+def test_an_exe_path_goal_is_what_its_client_asked_for(path, controller, tolerances, slot):
+    sent = {
+        "path": path_message(path, CONTEXT),
+        "controller": controller,
+        "concurrency_slot": slot,
+        "tolerance_from_action": tolerances is not None,
+        "dist_tolerance": tolerances[0] if tolerances else 0.0,
+        "angle_tolerance": tolerances[1] if tolerances else 0.0,
+    }
+    goal = mbf.exe_path_goal_of(through_json(sent, "mbf_msgs/action/ExePath_Goal"), CONTEXT)
+    assert same_path(goal.path, path)
+    asked = ExePathGoal(path, controller, *(tolerances or (None, None)), concurrency_slot=slot)
+    assert replace(goal, path=path) == asked
 
 
 @given(st.builds(RecoveryGoal, names, slots))
-def test_a_recovery_goal_comes_back_as_it_was(goal):
-    message = through_json(mbf.recovery_goal(goal, CONTEXT), "mbf_msgs/action/Recovery_Goal")
-    assert mbf.recovery_goal_of(message, CONTEXT) == goal
+def test_a_recovery_goal_is_what_its_client_asked_for(goal):
+    sent = {"behavior": goal.behavior, "concurrency_slot": goal.concurrency_slot}
+    assert mbf.recovery_goal_of(through_json(sent, "mbf_msgs/action/Recovery_Goal"), CONTEXT) == goal
 
 
 @given(
@@ -115,75 +128,62 @@ def test_a_recovery_goal_comes_back_as_it_was(goal):
         recovery_behaviors=st.none() | st.lists(names, min_size=1, max_size=3).map(tuple),
     )
 )
-def test_a_move_base_goal_comes_back_as_it_was(goal):
-    message = through_json(mbf.move_base_goal(goal, CONTEXT), "mbf_msgs/action/MoveBase_Goal")
-    assert mbf.move_base_goal_of(message, CONTEXT) == goal
+def test_a_move_base_goal_is_what_its_client_asked_for(goal):
+    sent = {
+        "target_pose": pose_stamped(goal.target_pose, CONTEXT),
+        "controller": goal.controller,
+        "planner": goal.planner,
+        "recovery_behaviors": list(goal.recovery_behaviors or ()),
+    }
+    assert mbf.move_base_goal_of(through_json(sent, "mbf_msgs/action/MoveBase_Goal"), CONTEXT) == goal
 
 
 @given(outcomes, texts, st.none() | paths(min_size=1), costs)
-def test_a_get_path_result_comes_back_as_it_was(outcome, text, path, cost):
+def test_a_client_gets_outcome_path_and_cost_of_a_plan(outcome, text, path, cost):
     result = GetPathResult(outcome, text, path, cost)
-    message = through_json(mbf.get_path_result(result, CONTEXT), "mbf_msgs/action/GetPath_Result")
-    back = mbf.get_path_result_of(message, CONTEXT)
-    assert same_path(back.path, path)
-    assert replace(back, path=path) == result
+    got = through_json(mbf.get_path_result(result, CONTEXT), "mbf_msgs/action/GetPath_Result")
+    assert same_path(path_of(got["path"], CONTEXT) if got["path"]["poses"] else None, path)
+    assert (got["outcome"], got["message"], got["cost"]) == (outcome, text, cost)
 
 
-@pytest.mark.parametrize(
-    ("kind", "name", "back"),
-    [(ExePathResult, "ExePath", mbf.exe_path_result_of), (MoveBaseResult, "MoveBase", mbf.move_base_result_of)],
-)
+def optional_pose(message):
+    return pose_of(message, CONTEXT) if message["header"]["frame_id"] else None
+
+
+def as_in_json(number):
+    """JSON has no infinity: a client gets null for it, read as NaN."""
+    return pytest.approx(math.nan if math.isinf(number) else number, rel=0.0, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("kind", "name"), [(ExePathResult, "ExePath"), (MoveBaseResult, "MoveBase")])
 @given(outcome=outcomes, text=texts, pose=st.none() | poses, dist=distances, angle=distances)
-def test_a_driving_result_comes_back_as_it_was_also_with_infinite_distances(
-    kind, name, back, outcome, text, pose, dist, angle
-):
-    result = kind(outcome, text, pose, dist, angle)
-    message = through_json(mbf.driving_result(result, CONTEXT), f"mbf_msgs/action/{name}_Result")
-    assert back(message, CONTEXT) == result
+def test_a_client_gets_the_end_of_a_drive(kind, name, outcome, text, pose, dist, angle):
+    message = mbf.driving_result(kind(outcome, text, pose, dist, angle), CONTEXT)
+    got = through_json(message, f"mbf_msgs/action/{name}_Result")
+    assert (got["outcome"], got["message"], optional_pose(got["final_pose"])) == (outcome, text, pose)
+    assert (got["dist_to_goal"], got["angle_to_goal"]) == (as_in_json(dist), as_in_json(angle))
 
 
 @given(st.builds(RecoveryResultMessage, outcomes, texts, names))
-def test_a_recovery_result_comes_back_as_it_was(result):
-    message = through_json(mbf.recovery_result(result, CONTEXT), "mbf_msgs/action/Recovery_Result")
-    assert mbf.recovery_result_of(message, CONTEXT) == result
+def test_a_client_gets_the_result_of_a_recovery(result):
+    got = through_json(mbf.recovery_result(result, CONTEXT), "mbf_msgs/action/Recovery_Result")
+    assert RecoveryResultMessage(got["outcome"], got["message"], got["used_plugin"]) == result
 
 
 @pytest.mark.parametrize("name", ["ExePath", "MoveBase"])
 @given(outcome=outcomes, text=texts, pose=poses, dist=distances, angle=distances, command=twists)
-def test_feedback_comes_back_without_our_additional_fields(name, outcome, text, pose, dist, angle, command):
+def test_a_client_gets_feedback(name, outcome, text, pose, dist, angle, command):
     feedback = ExePathFeedback(outcome, text, pose, dist, angle, 3.0, 4.0, command)
-    message = through_json(mbf.driving_feedback(feedback, CONTEXT), f"mbf_msgs/action/{name}_Feedback")
-    back = mbf.driving_feedback_of(message, CONTEXT)
-    assert math.isnan(back.distance_along_path) and back.time_to_goal == math.inf
-    assert replace(back, distance_along_path=3.0, time_to_goal=4.0) == feedback
+    got = through_json(mbf.driving_feedback(feedback, CONTEXT), f"mbf_msgs/action/{name}_Feedback")
+    assert (got["outcome"], got["message"], pose_of(got["current_pose"], CONTEXT)) == (outcome, text, pose)
+    assert (got["dist_to_goal"], got["angle_to_goal"]) == (as_in_json(dist), as_in_json(angle))
+    assert twist_of(got["last_cmd_vel"]["twist"]) == command
 
 
 def test_the_command_of_a_car_is_its_speed_and_steering_angle():
     feedback = ExePathFeedback(0, "", Pose.planar(0, 0), 1.0, 0.0, 1.0, 1.0, AckermannCommand(1.5, -0.25))
     twist = mbf.driving_feedback(feedback, CONTEXT)["last_cmd_vel"]["twist"]
     assert (twist["linear"]["x"], twist["angular"]["z"]) == (1.5, -0.25)
-
-
-@pytest.mark.parametrize(
-    ("make", "goal", "text"),
-    [
-        (mbf.get_path_goal, GetPathGoal(Pose.planar(1, 2)), "needs a tolerance"),
-        (mbf.get_path_goal, GetPathGoal(Pose.planar(1, 2), angle_tolerance=0.1), "no field for angle_tolerance"),
-        (mbf.get_path_goal, GetPathGoal(Pose.planar(1, 2), via=(Pose.planar(0, 1),)), "no field for via"),
-        (mbf.exe_path_goal, ExePathGoal(Path([[0, 0, 0]]), dist_tolerance=0.1), "both tolerances or none"),
-        (mbf.move_base_goal, MoveBaseGoal(Pose.planar(1, 2), dist_tolerance=0.1), "no field for dist_tolerance"),
-        (mbf.move_base_goal, MoveBaseGoal(Pose.planar(1, 2), recovery_behaviors=()), "no recovery at all"),
-        (mbf.move_base_goal, MoveBaseGoal(Pose.planar(1, 2), via=(Pose.planar(0, 1),)), "no field for via"),
-        (
-            mbf.move_base_goal,
-            MoveBaseGoal(Pose.planar(1, 2), goal_area=DiscArea(Pose.planar(1, 2), 3)),
-            "no field for goal_area",
-        ),
-    ],
-)
-def test_what_a_message_cannot_say_is_not_left_out_silently(make, goal, text):
-    with pytest.raises(MessageError, match=text):
-        make(goal, CONTEXT)
 
 
 def stamped(position=None, orientation=None, frame="map"):

@@ -20,7 +20,6 @@ from terrain.worlds.floor_plan import (
     FloorPlanError,
     read_floor_plan,
     write_map,
-    write_office_map,
 )
 from terrain.worlds.occupancy import OccupancyGrid, merge_rectangles, read_occupancy, wall_surface
 
@@ -61,7 +60,7 @@ def test_a_map_survives_writing_and_reading(tmp_path: Path) -> None:
 
 
 def test_the_shipped_office_is_what_its_plan_draws(tmp_path: Path) -> None:
-    drawn = write_office_map(tmp_path)
+    drawn = write_map(read_floor_plan().draw(), tmp_path, "office")
     assert drawn.read_bytes() == OFFICE_MAP.read_bytes()
     # pixels, not bytes: another release of zlib may pack the same picture differently
     pictures = [np.asarray(Image.open(folder / "office.png")) for folder in (tmp_path, DATA_FOLDER)]
