@@ -1,6 +1,6 @@
 """What a robot does that is blocked where it meets others: which behaviour it runs, and from which distance they meet.
 
-Nobody has to configure it. A robot that announces its way and has loaded a recovery named ``give_way`` runs that one,
+Nobody has to configure it. A robot that announces its path and has loaded a recovery named ``give_way`` runs that one,
 at the distance that ``give_way`` keeps. ``right_of_way_behavior`` names another one or none.
 """
 
@@ -13,13 +13,13 @@ from mbf_abstract.server.plugin_table import PluginTable
 USUAL_NAME = "give_way"
 """The recovery that is run where no other is named."""
 USUAL_DISTANCE = 0.8
-"""Ways nearer than this [m] meet, where neither the parameter nor the behaviour says how near."""
+"""Robots whose paths come nearer than this [m] meet, where neither the parameter nor the behaviour says how near."""
 
 
 def behavior_for_meetings(runtime: Runtime, plugins: PluginTable) -> str:
     """Name of the recovery that a blocked robot runs where it meets others, empty if none.
 
-    Without a name in the configuration it is the usual one, if that can be run and the robot announces its way: alone
+    Without a name in the configuration it is the usual one, if that can be run and the robot announces its path: alone
     it would meet nobody, and ``give_way`` stays among the usual recoveries.
     """
     named = runtime.parameters.right_of_way_behavior
@@ -30,7 +30,7 @@ def behavior_for_meetings(runtime: Runtime, plugins: PluginTable) -> str:
 
 
 def meeting_distance(runtime: Runtime, plugins: PluginTable) -> float:
-    """How near the ways [m] of two robots come that meet: as configured, else what the behaviour itself goes by."""
+    """How near the paths of two robots come that meet [m]: as configured, else what the behaviour itself goes by."""
     configured = runtime.parameters.right_of_way_distance
     own = own_distance(runtime, plugins) if configured is None else configured
     return USUAL_DISTANCE if own is None else own

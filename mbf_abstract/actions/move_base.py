@@ -21,7 +21,7 @@ cancel                  cancel the sub-goals, wait for their ends, end CANCELED
 
 A robot that is stuck (failures of one kind at one place, again and again) gets the behaviours of
 ``escalation_behaviors`` instead of those of the list, and so does one whose list is used up; see
-``actions.stuck_monitor``. One that is blocked where it meets robots that announce their ways runs the behaviour for
+``actions.stuck_monitor``. One that is blocked where it meets robots that announce their paths runs the behaviour for
 ``actions.meetings`` first. Without an escalation and alone, the machine is that of Move Base Flex.
 
 Each behaviour of the list runs at most once until the list is reset: by a plan after trigger *plan*, by

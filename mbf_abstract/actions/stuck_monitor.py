@@ -5,7 +5,7 @@ An executive notes every failure it recovers from and every behaviour it has run
 the monitor emits an event, and the behaviours of ``escalation_behaviors`` are due, one after the other. Each runs once
 at a place; then there is nothing left to try, and ``described`` gives the text with which the executive gives up.
 
-Where a robot is blocked and meets robots that announce their ways (``mbf_abstract.traffic``), the behaviour for
+Where a robot is blocked and meets robots that announce their paths (``mbf_abstract.traffic``), the behaviour for
 ``meetings`` is due at the first failure: what clears maps or backs up takes time, and the others do not know of it. It
 runs ``MOST_MEETINGS`` times at a place at most.
 
@@ -131,7 +131,7 @@ class StuckMonitor:
             )
 
     def _meets_others(self) -> bool:
-        """Whether the robot meets robots that announce their ways."""
+        """Whether the robot meets robots that announce their paths."""
         distance = meeting_distance(self._runtime, self._plugins)
         return bool(self._runtime.traffic.rivals(self._runtime.clock.now(), distance, MEETING_LENGTH))
 

@@ -128,14 +128,14 @@ class NavigationParameters(ParameterModel):
     )
     right_of_way_behavior: str | None = parameter(
         None,
-        "Recovery behaviour of a robot that is blocked where it meets robots that announce their ways, before any "
+        "Recovery behaviour of a robot that is blocked where it meets robots that announce their paths, before any "
         "other. It is then not among those that move_base runs by default. Empty = none; absent = the one named "
-        "give_way, of a robot that has loaded it and announces its own way.",
+        "give_way, of a robot that has loaded it and announces its own path.",
     )
     right_of_way_distance: float | None = parameter(
         None,
-        "Two robots meet where their ways come nearer to each other than this; absent = the distance of the behaviour, "
-        "or 0.8 m where it has none.",
+        "Two robots meet where their paths come nearer to each other than this; absent = the distance of the "
+        "behaviour, or 0.8 m where it has none.",
         unit="m",
         gt=0.0,
         le=5.0,

@@ -1,13 +1,13 @@
-"""Where a robot can leave its way and let others pass, and the shortest manoeuvre there; for any map.
+"""Where a robot can leave its path and let others pass, and the shortest manoeuvre there; for any map.
 
 When to use: in a recovery that makes room, such as ``give_way``. When not: obstacles that stay where they are.
 
-The way is known in the plane of the robot at its pose ``begin``: on a slope its distances are those along the ground.
-Places of a manoeuvre lie on the ground near that plane, so a way of others that is farther than ``STOREY`` above or
-below it leads over another storey and is in nobody's way here.
+Paths are given in the plane of the robot at its pose ``begin``: on a slope their distances are those along the ground.
+Places of a manoeuvre lie on the ground near that plane, so another robot's path farther than ``STOREY`` above or below
+it leads over another storey and need not be kept free.
 
 A manoeuvre is driven with small errors, and may end a little before its place. So the search first asks for ``ROOM``
-around the outline and for a place ``AT_EASE`` farther from the way than it must be; if there is none, for no room and
+around the outline and for a place ``AT_EASE`` farther from the paths than it must be; if there is none, for no room and
 ``SHORT``.
 """
 
@@ -26,7 +26,7 @@ from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.traffic.right_of_way import STOREY
 
-WAY_SPACING = 0.1  # m
+PATH_SPACING = 0.1  # m
 ROOM = 0.05  # m
 AT_EASE, SHORT = 0.1, 0.05  # m
 LEAVING = 0.3  # m around a robot that touches something, or nearly does
@@ -36,13 +36,13 @@ NEAREST_WITHIN = 2.0  # m
 def find_pull_out(
     navigation_map: NavigationMap,
     start: Pose,
-    way: FloatArray,
+    keep_free: FloatArray,
     distance: float,
     reach: float,
     turning_radius: float = 0.0,
     is_canceled: Callable[[], bool] = lambda: False,
 ) -> list[Step] | None:
-    """Find the shortest manoeuvre from ``start`` to a place beside a way.
+    """Find the shortest manoeuvre from ``start`` to a place beside the paths that must stay free.
 
     Parameters
     ----------
@@ -50,8 +50,8 @@ def find_pull_out(
         The robot's outline with its padding touches nothing of it.
     start : Pose
         Of the robot, in the frame of the map.
-    way : (n, 2) float64
-        Points [m] of all that must stay free, in the plane of the robot: x ahead, y to the left.
+    keep_free : (n, 2) float64
+        Points [m] of those paths in the plane of the robot, x ahead, y to the left; see ``paths_to_keep_free``.
     distance : float
         How far [m] the robot's base stands from all of it, at least.
     reach, turning_radius, is_canceled
@@ -66,7 +66,7 @@ def find_pull_out(
         is_free = _freedom(navigation_map, start, room)
 
         def left(pose: PlanarPose, wanted: float = distance + farther) -> float:
-            return max(wanted - float(norm(way - np.array(pose[:2])).min()), 0.0)
+            return max(wanted - float(norm(keep_free - np.array(pose[:2])).min()), 0.0)
 
         steps = find_manoeuvre(is_free, left, reach, turning_radius, is_canceled)
         if steps is not None:
@@ -105,16 +105,16 @@ def _gap(navigation_map: NavigationMap, pose: Pose) -> float:
     return math.inf if offset is None else math.hypot(*offset)
 
 
-def way_in_plane(begin: Pose, track: FloatArray, ways: Sequence[FloatArray], length: float) -> FloatArray:
-    """Return what a robot must leave free, in its plane: its own way, and those of others on its storey.
+def paths_to_keep_free(begin: Pose, track: FloatArray, paths: Sequence[FloatArray], length: float) -> FloatArray:
+    """Return what a robot must leave free, in its plane: its own path, and those of others on its storey.
 
     Parameters
     ----------
     begin : Pose
         Of the robot.
     track : (n, 3) float64
-        Where it has driven [m], oldest first. Its own way is this, straight on behind it, and straight ahead.
-    ways : sequence of (n, 3) float64
+        Where it has driven [m], oldest first. Its own path is this, straight on behind it, and straight ahead.
+    paths : sequence of (n, 3) float64
         Where others go [m], in the frame of ``begin``.
     length : float
         How far [m] to go back and straight on.
@@ -124,13 +124,13 @@ def way_in_plane(begin: Pose, track: FloatArray, ways: Sequence[FloatArray], len
     (n, 2) float64
         Points [m], x ahead, y to the left.
     """
-    on = np.arange(0.0, length, WAY_SPACING)[:, None]
+    on = np.arange(0.0, length, PATH_SPACING)[:, None]
     behind = np.concatenate([np.zeros((1, 2)), _on_storey(begin, track[::-1])])
     driven = np.concatenate([[0.0], np.cumsum(norm(np.diff(behind, axis=0)))])
     behind = behind[driven <= length]
-    older = behind[norm(behind - behind[-1]) > WAY_SPACING]
+    older = behind[norm(behind - behind[-1]) > PATH_SPACING]
     back = behind[-1] - older[-1] if len(older) else np.array([-1.0, 0.0])
-    others = [_on_storey(begin, way) for way in ways]
+    others = [_on_storey(begin, path) for path in paths]
     return np.concatenate([on * (1.0, 0.0), behind, behind[-1] + on * back / norm(back), *others])
 
 

@@ -57,13 +57,13 @@ class Announcer:
             position = runtime.robot.pose().position
         except RobotStateError:
             return
-        way, remaining, destination = np.array([position]), 0.0, None
+        path, remaining, destination = np.array([position]), 0.0, None
         if self._tracker is not None:
             self._tracker.update(position)
-            way = np.concatenate([way, self._tracker.ahead(LENGTH)])
-            remaining = float(norm(way[1] - way[0])) + self._tracker.remaining
+            path = np.concatenate([path, self._tracker.ahead(LENGTH)])
+            remaining = float(norm(path[1] - path[0])) + self._tracker.remaining
             destination = self._tracker.points[-1]
-        state = Announcement("", now, way, round(remaining, DIGITS), radius=self._server.robot_radius)
+        state = Announcement("", now, path, round(remaining, DIGITS), radius=self._server.robot_radius)
         runtime.traffic.announce(state, destination)
 
     def _take_path(self, now: float) -> None:

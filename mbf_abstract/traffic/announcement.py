@@ -11,7 +11,7 @@ from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import norm
 
 SPACING = 0.1
-"""Distance [m] of the points at which two ways are compared."""
+"""Distance [m] of the points at which two paths are compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +24,10 @@ class Announcement:
         Of the robot; no other robot has it.
     stamp : float
         Time [s] of all this, on the clock of this robot; others only see by it whether it has announced anew.
-    way : (n, 3) float64
+    path : (n, 3) float64
         Where it is, then the path that it wants to follow from there [m]; only where it is if it goes nowhere.
     remaining : float
-        Length [m] of the way to its goal, of which ``way`` may be the beginning; while it meets others, that of the
+        Length [m] of the path to its goal, of which ``path`` may be the beginning; while it meets others, that of the
         moment when it met them.
     cannot_yield : bool
         Whether it has looked for a place to let others pass and has found none, or did not get there.
@@ -39,7 +39,7 @@ class Announcement:
 
     name: str
     stamp: float
-    way: FloatArray
+    path: FloatArray
     remaining: float
     cannot_yield: bool = False
     waits: int = 0
@@ -47,7 +47,7 @@ class Announcement:
 
     def to_json(self) -> str:
         """Return it as a JSON object, to be sent; ``from_json`` reads it."""
-        values = vars(self) | {"way": self.way.tolist()}
+        values = vars(self) | {"path": self.path.tolist()}
         return json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
     @classmethod
@@ -55,11 +55,11 @@ class Announcement:
         """Read what ``to_json`` has written; raises ValueError for anything else."""
         try:
             values = json.loads(text)
-            way = np.array(values["way"], dtype=np.float64).reshape(-1, 3)
+            path = np.array(values["path"], dtype=np.float64).reshape(-1, 3)
             read = cls(
                 str(values["name"]),
                 float(values["stamp"]),
-                way,
+                path,
                 float(values["remaining"]),
                 bool(values["cannot_yield"]),
                 int(values["waits"]),
@@ -67,15 +67,15 @@ class Announcement:
             )
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise ValueError(f"no announcement of a robot: {type(error).__name__}: {error}") from error
-        numbers = np.array([read.stamp, read.remaining, read.radius, *way.ravel()])
-        if not (read.name and len(way) and np.isfinite(numbers).all() and read.radius >= 0.0):
+        numbers = np.array([read.stamp, read.remaining, read.radius, *path.ravel()])
+        if not (read.name and len(path) and np.isfinite(numbers).all() and read.radius >= 0.0):
             raise ValueError(
                 "no announcement of a robot: it needs a name, a place and finite numbers, the radius not below 0"
             )
         return read
 
     def points_ahead(self, length: float) -> FloatArray:
-        """Points (n, 3) [m] of its way up to ``length`` [m] from where it is, ``SPACING`` apart, the first included."""
-        driven = np.concatenate([[0.0], np.cumsum(norm(np.diff(self.way, axis=0)))])
+        """Points (n, 3) [m] of its path from where it is up to ``length`` [m], ``SPACING`` apart."""
+        driven = np.concatenate([[0.0], np.cumsum(norm(np.diff(self.path, axis=0)))])
         at = np.arange(0.0, min(length, float(driven[-1])) + 0.5 * SPACING, SPACING)
-        return np.column_stack([np.interp(at, driven, column) for column in self.way.T])
+        return np.column_stack([np.interp(at, driven, column) for column in self.path.T])

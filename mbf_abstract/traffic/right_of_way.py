@@ -1,12 +1,12 @@
 """Who of two robots goes first where only one can, by a rule that both compute from what they have announced.
 
 First goes the one that cannot yield; of two that can, or two that cannot, the one that has waited in vain less often;
-of two that have waited equally often, the one that has less way to its goal; of two with equally much, the one whose
-name comes first. The ranks of all robots are in one order, so of any number of robots in each other's way exactly one
-may go before all others, and they never wait for each other in a circle. The rule of the road, right before left, would
-let four robots at a crossing wait for ever.
+of two that have waited equally often, the one with the shorter path to its goal; of two equally long paths, that of the
+robot whose name comes first. The ranks of all robots are in one order, so of any number of robots whose paths conflict
+exactly one may go before all others, and they never wait for each other in a circle. The rule of the road, right before
+left, would let four robots at a crossing wait for ever.
 
-While robots meet, each announces the way that it had left when they met. So the decision lasts, also where the one that
+While robots meet, each announces the length that was left when they met. So the decision lasts, also where the one that
 yields drives forward, or the other one plans a detour. Only a wait in vain, or a robot that cannot yield, changes it.
 """
 
@@ -18,9 +18,9 @@ from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.traffic.announcement import Announcement
 
 MEETING_LENGTH = 5.0
-"""How far along its way [m] a robot is blocked by others: about as far as it sees them."""
+"""How far along its path [m] a robot is blocked by others: about as far as it sees them."""
 STOREY = 1.0
-"""Ways that are farther [m] than this above each other lead over different storeys."""
+"""Paths that are farther [m] than this above each other lead over different storeys."""
 
 
 def right_of_way(mine: Announcement, other: Announcement) -> bool:
@@ -37,25 +37,25 @@ def _rank(robot: Announcement) -> tuple[bool, int, float, str]:
     return not robot.cannot_yield, robot.waits, robot.remaining, robot.name
 
 
-def in_each_others_way(mine: Announcement, other: Announcement, distance: float, length: float) -> bool:
-    """Whether the ways of two robots over the next ``length`` [m] come nearer than ``distance`` [m]; symmetric.
+def paths_conflict(mine: Announcement, other: Announcement, distance: float, length: float) -> bool:
+    """Whether the paths of two robots over the next ``length`` [m] come nearer than ``distance`` [m]; symmetric.
 
-    Where one is more than ``STOREY`` above the other they are not, whatever the distance: a robot on a bridge is in
-    nobody's way below it.
+    Where one is more than ``STOREY`` above the other they do not conflict, whatever the distance: a robot on a bridge
+    blocks nobody below it.
     """
     offsets = mine.points_ahead(length)[:, None] - other.points_ahead(length)
     return bool(((norm(offsets) < distance) & (np.abs(offsets[..., 2]) <= STOREY)).any())
 
 
 def face_each_other(mine: Announcement, other: Announcement, length: float) -> bool:
-    """Whether each of two robots is ahead on the next ``length`` [m] of the other's way.
+    """Whether each of two robots is ahead on the next ``length`` [m] of the other's path.
 
-    So neither follows the other, and they have not passed each other. Of one that announces no way, because it lets
+    So neither follows the other, and they have not passed each other. Of one that announces no path, because it lets
     others pass, only its place counts.
     """
-    return _is_ahead(other, mine, length) and (len(other.way) == 1 or _is_ahead(mine, other, length))
+    return _is_ahead(other, mine, length) and (len(other.path) == 1 or _is_ahead(mine, other, length))
 
 
 def _is_ahead(robot: Announcement, traveller: Announcement, length: float) -> bool:
-    """Whether a robot is nearer to a later point of the traveller's way than to where the traveller is."""
-    return int(np.argmin(norm(traveller.points_ahead(length) - robot.way[0]))) > 0
+    """Whether a robot is nearer to a later point of the traveller's path than to where the traveller is."""
+    return int(np.argmin(norm(traveller.points_ahead(length) - robot.path[0]))) > 0

@@ -15,7 +15,7 @@ from typing import Protocol
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.traffic.announcement import Announcement
-from mbf_abstract.traffic.right_of_way import face_each_other, in_each_others_way
+from mbf_abstract.traffic.right_of_way import face_each_other, paths_conflict
 
 MAX_AGE = 3.0
 """A robot that announces nothing new for this long [s] does not count: it is switched off, or out of reach."""
@@ -66,7 +66,7 @@ class Meeting:
     seen : float
         Last time [s] at which anybody was in the way.
     remaining : float
-        Length [m] of the way to the goal when they met.
+        Length [m] of the path to the goal when they met.
     no_place_at : (3,) float64 or None
         Where the robot has found no place to let others pass [m], if it has looked; it still cannot yield there.
     waits : int
@@ -132,7 +132,7 @@ class Traffic:
             self._meeting = None
         now, meeting = announcement.stamp, self._meeting
         if meeting is not None:
-            meeting.at(announcement.way[0])
+            meeting.at(announcement.path[0])
         self._publish(announcement)
         self.others(now)  # their announcements age, also while no plugin asks for them
         if meeting is not None:
@@ -155,7 +155,7 @@ class Traffic:
         if meeting is not None and own.remaining > 0.0:  # one that has arrived has nothing left
             own = replace(own, remaining=meeting.remaining, cannot_yield=meeting.cannot_yield, waits=meeting.waits)
         self.own = own
-        self._channel.publish(replace(own, way=own.way[:1]) if self.yields else own)
+        self._channel.publish(replace(own, path=own.path[:1]) if self.yields else own)
 
     # ----------------------------------------------------------------------------------------------- a meeting
     def meet(self, now: float, distance: float, length: float) -> tuple[Announcement, ...]:
@@ -169,7 +169,7 @@ class Traffic:
         """Announce for the present meeting whether there is a place to let the others pass."""
         meeting, own = self._meeting, self.own  # the announcing thread may end the meeting
         if meeting is not None and own is not None:
-            meeting.no_place_at = own.way[0] if cannot_yield else None
+            meeting.no_place_at = own.path[0] if cannot_yield else None
             self._publish(own)
 
     def wait_was_in_vain(self, rivals: Sequence[Announcement]) -> None:
@@ -196,20 +196,20 @@ class Traffic:
         return seen if seen is not None and seen[0] == announcement.stamp else (announcement.stamp, now)
 
     def rivals(self, now: float, distance: float, length: float) -> tuple[Announcement, ...]:
-        """Robots that go somewhere, in this robot's way as it is in theirs, and ahead; none that go the same way.
+        """Robots that go somewhere, whose path conflicts with this robot's, and that face it.
 
-        So one that follows this robot, or drives on before it, is no rival.
+        One that follows this robot, or drives on before it, is no rival.
 
         Parameters
         ----------
         now : float
             [s]
         distance, length : float
-            Their ways come nearer than ``distance`` [m] over the next ``length`` [m] of both.
+            Their paths come nearer than ``distance`` [m] over the next ``length`` [m] of both.
         """
         own = self.own
         if own is None:
             return ()
         going = [other for other in self.others(now) if other.remaining > 0.0]
-        near = [other for other in going if in_each_others_way(own, other, distance, length)]
+        near = [other for other in going if paths_conflict(own, other, distance, length)]
         return tuple(other for other in near if face_each_other(own, other, length))

@@ -1,10 +1,10 @@
-"""Give way: drive out of the way that the robot came along and would go on, to where another one can pass, and wait.
+"""Give way: drive off the path that the robot came along and would go on, to where another one can pass, and wait.
 
 When to use: as ``right_of_way_behavior``; in ``escalation_behaviors``, against whoever stands head on in a corridor or
 a door and waits for us. When not: things that never move; plan around those. Give two robots of the same kind different
 seeds: both may give way at first, the waits they draw let one go on before the other.
 
-The way is the track that the robot has driven, straight ahead and straight on behind the track. The nearest place is
+Its path is the track that the robot has driven, straight ahead and straight on behind the track. The nearest place is
 searched where the base stands ``distance`` from all of it, by the shortest manoeuvre on which the outline touches
 nothing the map knows: back into a bay, around a corner, or a step aside in a hall; see ``maps.pull_out``. It is driven
 slowly, each command checked as in every recovery. Where a command is refused, the robot waits for ``PAUSE``, in which
@@ -12,7 +12,7 @@ somebody who moves there stops or passes, and searches anew, ``ATTEMPTS`` times 
 that is drawn anew for each run. Where there is no such place it ends with IMPASSABLE at once.
 
 Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
-goes first waits until the others are out of its way, the others pull out, also out of the way that the first one has
+goes first waits until the others have left its path; the others pull out, also off the path that the first one has
 announced, and wait until it has passed. Both wait while the others move, and ``longest_wait`` longer, but not more than
 ``MOST_WAITS`` times as long in all. One that finds no place, or does not get there, announces that, and then goes
 first. One that goes first and has waited in vain announces that, too: then the others go first, and it pulls out
@@ -39,7 +39,7 @@ from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
 from mbf_abstract.maps.manoeuvres import PlanarPose, Step
-from mbf_abstract.maps.pull_out import find_pull_out, way_in_plane
+from mbf_abstract.maps.pull_out import find_pull_out, paths_to_keep_free
 from mbf_abstract.maps.recoveries.wait import stand
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -62,8 +62,8 @@ class GiveWayParameters(GuardedMotionParameters):
 
     distance: float = parameter(
         0.8,
-        "How far its base stands from its way, at least: half of both widths and a margin. Others are in its way where "
-        "theirs comes nearer.",
+        "How far its base stands from its path, at least: half of both widths and a margin. Others meet it where their "
+        "path comes nearer.",
         unit="m",
         gt=0.0,
         le=5.0,
@@ -117,11 +117,11 @@ class GiveWayRecovery(GuardedRecovery):
 
     @property
     def meeting_distance(self) -> float:
-        """Others are in its way where theirs comes nearer than this [m]."""
+        """Others meet it where their path comes nearer than this [m]."""
         return self.parameters.distance
 
     def _pull_out(self, request: RecoveryRequest) -> RecoveryResult:
-        """Search a place and drive there section by section; search anew where the way there is not free."""
+        """Search a place and drive there section by section; search anew where the drive there is not free."""
         p, token = self.parameters, request.cancel_token
         result = RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
         for attempt in range(ATTEMPTS):
@@ -134,7 +134,7 @@ class GiveWayRecovery(GuardedRecovery):
             if token.cancelled:
                 return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
             if steps is None:
-                text = f"no place {p.distance:g} m beside its way within a manoeuvre of {p.reach:g} m"
+                text = f"no place {p.distance:g} m beside its path within a manoeuvre of {p.reach:g} m"
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
             self.traffic.set_cannot_yield(False)
             result = self._drive_along(begin, steps, request)
@@ -143,12 +143,12 @@ class GiveWayRecovery(GuardedRecovery):
         return result
 
     def _stand_aside(self, request: RecoveryRequest, before: list[Announcement]) -> RecoveryResult:
-        """Wait beside the way, until the robots that go first have passed."""
+        """Wait beside the path, until the robots that go first have passed."""
         p, place = self.parameters, request.motion.pose()
         if before:
             return self._wait_for(request, before, f"has pulled out at ({place.x:.2f}, {place.y:.2f}) for")
         result = stand(request, p.wait + p.random_extra * float(self.rng.random()))
-        return replace(result, message=f"{result.message} at ({place.x:.2f}, {place.y:.2f}), beside its way")
+        return replace(result, message=f"{result.message} at ({place.x:.2f}, {place.y:.2f}), beside its path")
 
     def _drive_along(self, begin: Pose, steps: list[Step], request: RecoveryRequest) -> RecoveryResult:
         frame = Transform(begin.position, begin.orientation, begin.frame_id, "begin")
@@ -174,10 +174,10 @@ class GiveWayRecovery(GuardedRecovery):
         return [rival for rival in rivals if own is not None and not right_of_way(own, rival)]
 
     def _wait_for(self, request: RecoveryRequest, rivals: Sequence[Announcement], why: str) -> RecoveryResult:
-        """Stand until none of these robots is in the way, or the turn is another's, or they stand for too long."""
+        """Stand until none of these robots blocks it, or the turn is another's, or they stand for too long."""
         names, begun = {rival.name for rival in rivals}, self.clock.now()
         went_before = {rival.name for rival in self._before(rivals)}
-        places, moved, longest = {rival.name: rival.way[0] for rival in rivals}, begun, self.parameters.longest_wait
+        places, moved, longest = {rival.name: rival.path[0] for rival in rivals}, begun, self.parameters.longest_wait
         while self.clock.now() < min(moved + longest, begun + MOST_WAITS * longest):
             result = stand(request, WAIT_PERIOD)
             if not result.success:
@@ -186,8 +186,8 @@ class GiveWayRecovery(GuardedRecovery):
             if not left or {rival.name for rival in self._before(left)} - went_before:
                 break
             for rival in left:
-                if norm(rival.way[0] - places[rival.name]) > MOVED:
-                    places[rival.name], moved = rival.way[0], self.clock.now()
+                if norm(rival.path[0] - places[rival.name]) > MOVED:
+                    places[rival.name], moved = rival.path[0], self.clock.now()
         text = f"{why} {', '.join(sorted(names))}; waited {self.clock.now() - begun:.1f} s"
         return RecoveryResult(RecoveryOutcome.SUCCESS, text)
 
@@ -204,26 +204,26 @@ class GiveWayRecovery(GuardedRecovery):
     def _forget_left_places(self, pose: Pose, rivals: Sequence[Announcement]) -> None:
         """Free what the maps keep of the bodies of robots that have left: no ray passes all of these cells."""
         now, size = self.clock.now(), self.parameters.distance
-        present = {other.name: other.way[0] for other in self.traffic.others(now)}
+        present = {other.name: other.path[0] for other in self.traffic.others(now)}
         known = [rival for rival in rivals if rival.name in present and rival.radius > 0.0]
-        left = [one for one in known if all(norm(there - one.way[0]) > size for there in present.values())]
+        left = [one for one in known if all(norm(there - one.path[0]) > size for there in present.values())]
         for one in (self.maps.values() or [self.navigation_map]) if left else ():
             for rival in left:
-                x, y, z = rival.way[0].tolist()
+                x, y, z = rival.path[0].tolist()
                 place = Pose.planar(x, y, z=z, frame_id=pose.frame_id)
                 one.clear_area(self.on_map(place, one), 2.0 * rival.radius)
             one.update(self.on_map(pose, one), now)
 
     # -------------------------------------------------------------------------------------------------- the search
     def _manoeuvre(self, begin: Pose, request: RecoveryRequest) -> list[Step] | None:
-        """Shortest manoeuvre in the plane of the robot at ``begin`` to a place beside its way and those of others."""
+        """Shortest manoeuvre in the plane of the robot at ``begin`` to a place beside its path and those of others."""
         p, token = self.parameters, request.cancel_token
         length = p.reach + p.distance
-        ways = [rival.points_ahead(length) for rival in self._before(self._rivals())]
-        way = way_in_plane(begin, self.robot.recent_track(), ways, length)
+        paths = [rival.points_ahead(length) for rival in self._before(self._rivals())]
+        keep_free = paths_to_keep_free(begin, self.robot.recent_track(), paths, length)
         start, turning_radius = self.on_map(begin), self.min_turning_radius
         return find_pull_out(
-            self.navigation_map, start, way, p.distance, p.reach, turning_radius, lambda: token.cancelled
+            self.navigation_map, start, keep_free, p.distance, p.reach, turning_radius, lambda: token.cancelled
         )
 
     # --------------------------------------------------------------------------------------------------- the drive

@@ -256,8 +256,8 @@ def test_each_robot_of_a_fleet_hears_where_the_others_are_and_where_they_go():
         place = anna.robot.pose()
     assert {name: list(others) for name, others in heard.items()} == {"anna": ["ben"], "ben": ["anna"]}
     assert heard["ben"]["anna"].remaining == pytest.approx(7.5, abs=1.5)
-    assert np.hypot(*(heard["ben"]["anna"].way[0, :2] - (place.x, place.y))) < 0.5
-    assert (heard["anna"]["ben"].remaining, len(heard["anna"]["ben"].way)) == (0.0, 1)
+    assert np.hypot(*(heard["ben"]["anna"].path[0, :2] - (place.x, place.y))) < 0.5
+    assert (heard["anna"]["ben"].remaining, len(heard["anna"]["ben"].path)) == (0.0, 1)
 
 
 # ------------------------------------------------------------------------------------------------- the judgement

@@ -10,7 +10,7 @@ from mbf_abstract.plugins import RecoveryResult
 from mbf_abstract.server.announcer import IDLE_TIME, LENGTH, Announcer
 from mbf_abstract.testing.faulty import slow
 from mbf_abstract.traffic.announcement import Announcement
-from mbf_abstract.traffic.right_of_way import in_each_others_way
+from mbf_abstract.traffic.right_of_way import paths_conflict
 from mbf_abstract.traffic.traffic import MAX_AGE, SharedChannel, Traffic
 
 
@@ -42,8 +42,8 @@ def test_a_robot_that_is_given_a_path_announces_it(robot):
     drive(robot, 0.0, 1.0, 2.0, 3.0)
     announced = robot.announced()
     place = robot.robot.pose.x
-    assert announced.way[0, 0] == pytest.approx(place, abs=0.02)
-    assert announced.way[-1].tolist() == [3.0, 0.0, 0.0]
+    assert announced.path[0, 0] == pytest.approx(place, abs=0.02)
+    assert announced.path[-1].tolist() == [3.0, 0.0, 0.0]
     assert announced.remaining == pytest.approx(3.0 - place, abs=0.02)
 
 
@@ -51,22 +51,22 @@ def test_of_a_path_of_two_poses_the_stretch_ahead_is_announced_whole_and_without
     drive(robot, 0.0, 20.0)
     announced = robot.announced()
     place = robot.robot.pose.x
-    assert announced.way[-1, 0] == pytest.approx(place + LENGTH, abs=0.02)
+    assert announced.path[-1, 0] == pytest.approx(place + LENGTH, abs=0.02)
     assert announced.remaining == pytest.approx(20.0 - place, abs=0.02)
-    assert (np.diff(announced.way[:, 0]) >= 0.0).all()
+    assert (np.diff(announced.path[:, 0]) >= 0.0).all()
 
 
 def test_a_question_about_another_place_is_not_announced(robot):
     drive(robot, 0.0, 20.0)
     assert robot.navigator.send(GetPathGoal(Pose.planar(0.0, 30.0))).wait().success
-    assert robot.announced().way[-1, 1] == 0.0
+    assert robot.announced().path[-1, 1] == 0.0
     robot.navigator.cancel_all()
     robot.clock.sleep(IDLE_TIME)
     robot.announced()
     robot.planner.play(slow(robot.clock, 2.0, RuntimeError("late")))
     asked = robot.navigator.send(GetPathGoal(Pose.planar(0.0, 30.0)))
     robot.clock.sleep(1.0)
-    assert len(robot.announced().way) == 1
+    assert len(robot.announced().path) == 1
     asked.wait()
 
 
@@ -75,7 +75,7 @@ def test_a_new_path_is_announced_while_the_robot_drives_on(robot):
     robot.announced()
     drive(robot, 0.0, 5.0)
     announced = robot.announced()
-    assert announced.way[-1, 0] == 5.0
+    assert announced.path[-1, 0] == 5.0
     assert announced.remaining == pytest.approx(5.0 - robot.robot.pose.x, abs=0.02)
 
 
@@ -100,18 +100,18 @@ def test_the_path_is_kept_during_a_recovery_and_forgotten_by_an_idle_robot(robot
     robot.recovery.play(slow(robot.clock, 2.0 * IDLE_TIME, RecoveryResult(RecoveryOutcome.SUCCESS)))
     recovery = robot.navigator.send(RecoveryGoal("recovery"))
     robot.clock.sleep(1.5 * IDLE_TIME)
-    assert robot.announced().way[-1, 0] == 5.0
+    assert robot.announced().path[-1, 0] == 5.0
     recovery.wait()
     robot.announced()
     robot.clock.sleep(IDLE_TIME)
     announced = robot.announced()
-    assert (len(announced.way), announced.remaining) == (1, 0.0)
+    assert (len(announced.path), announced.remaining) == (1, 0.0)
 
 
 def test_a_path_that_is_not_known_in_the_global_frame_is_not_announced(robot):
     lost = Path.from_poses([Pose.planar(x, 0.0, frame_id="elsewhere") for x in (0.0, 1.0)])
     robot.navigator.send(ExePathGoal(lost))
-    assert len(robot.announced().way) == 1
+    assert len(robot.announced().path) == 1
 
 
 # ------------------------------------------------------------------------------------------ what others believe
@@ -145,6 +145,6 @@ def test_announcements_age_also_while_nobody_asks_for_them():
 
 
 def test_a_robot_on_a_bridge_is_not_in_the_way_of_one_below_it():
-    assert in_each_others_way(state(0.0), state(0.0, z=0.2), 0.8, 5.0)
-    assert not in_each_others_way(state(0.0), state(0.0, z=4.0), 0.8, 5.0)
-    assert not in_each_others_way(state(0.0), state(0.0, z=2.5), 5.0, 5.0)
+    assert paths_conflict(state(0.0), state(0.0, z=0.2), 0.8, 5.0)
+    assert not paths_conflict(state(0.0), state(0.0, z=4.0), 0.8, 5.0)
+    assert not paths_conflict(state(0.0), state(0.0, z=2.5), 5.0, 5.0)

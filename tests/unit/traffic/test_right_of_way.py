@@ -10,17 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mbf_abstract.traffic.announcement import SPACING, Announcement
-from mbf_abstract.traffic.right_of_way import STOREY, face_each_other, in_each_others_way, right_of_way
+from mbf_abstract.traffic.right_of_way import STOREY, face_each_other, paths_conflict, right_of_way
 from mbf_abstract.traffic.traffic import MAX_AGE, PARTED_AFTER, SharedChannel, Traffic
 
 coordinates = st.floats(-20.0, 20.0, width=32)
 heights = st.sampled_from([0.0, 0.25, 4.0])  # the ground, a kerb, a bridge
-ways = st.lists(st.tuples(coordinates, coordinates, heights), min_size=1, max_size=8).map(np.array)
+paths = st.lists(st.tuples(coordinates, coordinates, heights), min_size=1, max_size=8).map(np.array)
 announcements = st.builds(
     Announcement,
     name=st.sampled_from(["anna", "ben", "carla", "dora", "emil"]),
     stamp=st.floats(0.0, 1e4),
-    way=ways,
+    path=paths,
     remaining=st.integers(0, 3).map(float),
     cannot_yield=st.booleans(),
     waits=st.integers(0, 2),
@@ -53,7 +53,7 @@ def test_of_any_number_of_robots_exactly_one_goes_before_all_others(fleet):
     ids=[
         "one that cannot yield",
         "then the one that has waited in vain less often",
-        "then the one with less way left",
+        "then the one with the shorter path",
         "then by name",
     ],
 )
@@ -69,11 +69,11 @@ def test_two_robots_of_one_name_are_refused():
 
 
 def naive_gap(a, b, length, storey):
-    """Least distance of two ways by their corners, cut off and sampled finely, within a difference of height."""
+    """Least distance of two paths by their corners, cut off and sampled finely, within a difference of height."""
 
-    def points(way):
-        cut, left = [way[0]], length
-        for p, q in itertools.pairwise(way):
+    def points(path):
+        cut, left = [path[0]], length
+        for p, q in itertools.pairwise(path):
             step = math.dist(p, q)
             share = min(1.0, left / step) if step > 0.0 else 1.0
             cut += [p + s * share * (q - p) for s in np.linspace(0.0, 1.0, 200)]
@@ -82,22 +82,22 @@ def naive_gap(a, b, length, storey):
                 break
         return np.array(cut)
 
-    mine, others = points(a.way), points(b.way)
+    mine, others = points(a.path), points(b.path)
     near = [others[np.abs(others[:, 2] - p[2]) <= storey] - p for p in mine]
     return min(float(np.sqrt((offsets**2).sum(axis=1)).min(initial=math.inf)) for offsets in near)
 
 
 @given(announcements, announcements, st.floats(0.5, 6.0))
-def test_ways_are_in_each_others_way_where_they_come_near_and_that_is_mutual(a, b, length):
+def test_paths_conflict_where_they_come_near_and_that_is_mutual(a, b, length):
     surely, perhaps = (naive_gap(a, b, length, STOREY + more) for more in (-2.0 * SPACING, 2.0 * SPACING))
-    assert math.isinf(surely) or in_each_others_way(a, b, surely + 2.0 * SPACING, length)
-    assert perhaps <= 2.0 * SPACING or not in_each_others_way(a, b, perhaps - 2.0 * SPACING, length)
-    assert in_each_others_way(a, b, 1.0, length) is in_each_others_way(b, a, 1.0, length)
+    assert math.isinf(surely) or paths_conflict(a, b, surely + 2.0 * SPACING, length)
+    assert perhaps <= 2.0 * SPACING or not paths_conflict(a, b, perhaps - 2.0 * SPACING, length)
+    assert paths_conflict(a, b, 1.0, length) is paths_conflict(b, a, 1.0, length)
 
 
 @given(announcements, announcements)
 def test_two_robots_that_go_somewhere_face_each_other_mutually(a, b):
-    assert len(a.way) == 1 or len(b.way) == 1 or face_each_other(a, b, 5.0) is face_each_other(b, a, 5.0)
+    assert len(a.path) == 1 or len(b.path) == 1 or face_each_other(a, b, 5.0) is face_each_other(b, a, 5.0)
 
 
 def along_x(x_from, x_to):
@@ -112,8 +112,8 @@ def along_x(x_from, x_to):
         (along_x(1.0, 4.0), False),
         (along_x(-1.0, 4.0), False),
         (along_x(-1.0, -4.0), False),
-        (replace(along_x(1.0, 4.0), way=np.array([[1.0, 0.0, 0.0]])), True),
-        (replace(along_x(-1.0, 4.0), way=np.array([[-1.0, 0.0, 0.0]])), False),
+        (replace(along_x(1.0, 4.0), path=np.array([[1.0, 0.0, 0.0]])), True),
+        (replace(along_x(-1.0, 4.0), path=np.array([[-1.0, 0.0, 0.0]])), False),
     ],
     ids=["head on", "to a goal before it", "ahead", "behind", "passed", "lets it pass", "lets it pass, behind"],
 )
@@ -127,10 +127,10 @@ def test_a_robot_faces_another_one_that(other, expected):
         "",
         "[]",
         "{}",
-        '{"name":"a","stamp":0,"way":[],"remaining":0,"cannot_yield":false,"waits":0,"radius":0}',
-        '{"name":"a","stamp":0,"way":[[0,0,0]],"remaining":0,"cannot_yield":false,"radius":0}',
-        '{"name":"a","stamp":0,"way":[[0,0,0]],"remaining":0,"cannot_yield":false,"waits":0,"radius":-0.1}',
-        '{"name":"a","stamp":0,"way":[[0,0,0]],"remaining":0,"cannot_yield":false,"waits":0,"radius":1e999}',
+        '{"name":"a","stamp":0,"path":[],"remaining":0,"cannot_yield":false,"waits":0,"radius":0}',
+        '{"name":"a","stamp":0,"path":[[0,0,0]],"remaining":0,"cannot_yield":false,"radius":0}',
+        '{"name":"a","stamp":0,"path":[[0,0,0]],"remaining":0,"cannot_yield":false,"waits":0,"radius":-0.1}',
+        '{"name":"a","stamp":0,"path":[[0,0,0]],"remaining":0,"cannot_yield":false,"waits":0,"radius":1e999}',
         "9" * 400,
         "null",
         pytest.param("[" * 100_000, id="nested too deeply"),
@@ -167,8 +167,8 @@ def test_one_that_lets_others_pass_announces_only_where_it_is():
     anna.connect("anna", channel)
     anna.yields = True
     anna.announce(state(1.0, 0.0, 3.0))
-    assert len(channel.latest()[0].way) == 1
-    assert len(anna.own.way) == 2
+    assert len(channel.latest()[0].path) == 1
+    assert len(anna.own.path) == 2
 
 
 # --------------------------------------------------------------------------------------------------- while they meet
