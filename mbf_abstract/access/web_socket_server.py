@@ -1,4 +1,4 @@
-"""A WebSocket server: who is let in, frames in and out, and pages that it serves.
+"""A WebSocket server: it lets clients in, see ``admission``, and carries their frames in and out.
 
 It runs on a thread and an event loop of its own. Other threads hand it work with ``post`` and never wait for it.
 """
@@ -6,7 +6,6 @@ It runs on a thread and an event loop of its own. Other threads hand it work wit
 from __future__ import annotations
 
 import asyncio
-import http
 import logging
 import threading
 from collections.abc import Callable, Mapping
@@ -14,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Generic
 
+from mbf_abstract.access.admission import Admission
 from mbf_abstract.access.page_access import PageAccess
 from mbf_abstract.access.visitor import AnyVisitor, Service, Visitor
 from mbf_abstract.events import EventBus, EventKind
@@ -23,16 +23,7 @@ POLICY_VIOLATION, TRY_AGAIN_LATER = 1008, 1013  # WebSocket close codes (RFC 645
 TIME_TO_AUTHENTICATE = 10.0  # s
 TIME_TO_START, TIME_TO_SEND, TIME_TO_STOP = 10.0, 0.5, 3.0  # s
 TIME_TO_SAY_GOODBYE = 1.0  # s for a client to answer that the connection closes
-MOST_REFUSALS = 20  # that are noted
 WRITE_LIMIT = 32 * 1024  # bytes on their way to one client, after which frames wait in its outbox
-SECURITY_HEADERS = {
-    "Referrer-Policy": "no-referrer",  # the token is in the address
-    "Cache-Control": "no-store",
-    "X-Frame-Options": "DENY",
-    "X-Content-Type-Options": "nosniff",
-    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; "
-    "connect-src 'self' ws: wss:",
-}
 
 _logger = logging.getLogger(__name__)
 _logger.addHandler(logging.NullHandler())  # wrong requests must not fill the terminal
@@ -131,7 +122,9 @@ class WebSocketServer(Generic[AnyVisitor]):
         self._loop = asyncio.new_event_loop()
         self._end: asyncio.Event | None = None
         self._visitors: set[AnyVisitor] = set()
-        self._refused: set[str] = set()
+        self._admission = Admission(
+            options.access, options.origins, offer.pages, offer.origin_option, offer.takes_auth, self._report_refusal
+        )
         self._started = threading.Event()
         self._problem: BaseException | None = None
         self._thread: ClockThread | None = None
@@ -188,7 +181,7 @@ class WebSocketServer(Generic[AnyVisitor]):
                     self._handle,
                     self._options.access.host,
                     port,
-                    process_request=self._answer_request,
+                    process_request=self._admission.answer,
                     subprotocols=[Subprotocol(name) for name in self._offer.subprotocols] or None,
                     max_size=self._options.max_message,
                     write_limit=WRITE_LIMIT,
@@ -205,46 +198,8 @@ class WebSocketServer(Generic[AnyVisitor]):
         while not all(client.outbox.is_empty for client in self._visitors):
             await asyncio.sleep(0.01)
 
-    def _answer_request(self, connection: Any, request: Any) -> Any:
-        """Refuse a request, answer it with a page, or let the WebSocket begin (None)."""
-        refused = self._refusal(request.path, request.headers)
-        if refused is not None:
-            self._note_refusal(refused[1])
-            return connection.respond(refused[0], f"{refused[1]}\n")
-        if request.headers.get("Upgrade", "").lower() == "websocket":
-            return None
-        found = self._options.access.role_and_path(request.path)
-        if found is None:
-            return connection.respond(http.HTTPStatus.FORBIDDEN, "the address needs the token\n")
-        page = self._offer.pages.get(found[1])
-        if page is None:
-            return connection.respond(http.HTTPStatus.NOT_FOUND, "there is no such page\n")
-        response = connection.respond(http.HTTPStatus.OK, "")
-        response.body = page[1]
-        del response.headers["Content-Type"], response.headers["Content-Length"]
-        response.headers.update({**SECURITY_HEADERS, "Content-Type": page[0], "Content-Length": str(len(page[1]))})
-        return response
-
-    def _note_refusal(self, text: str) -> None:
-        """Let the user know who is refused and why; each text once, and not without end."""
-        if text not in self._refused and len(self._refused) < MOST_REFUSALS:
-            self._refused.add(text)
-            self._events.emit(EventKind.CUSTOM, self._offer.name, refused=text)
-
-    def _refusal(self, path: str, headers: Any) -> tuple[http.HTTPStatus, str] | None:
-        """Why a request is refused, None if it is not; programs that are no browser send no ``Origin``."""
-        access, hosts, origins = self._options.access, headers.get_all("Host"), headers.get_all("Origin")
-        if len(hosts) != 1 or not access.knows_host(hosts[0]):
-            return http.HTTPStatus.FORBIDDEN, "this is not the name of the machine that serves"
-        own = origins and access.is_same_site(origins[0], hosts[0])
-        if len(origins) > 1 or (origins and not own and origins[0] not in self._options.origins):
-            return http.HTTPStatus.FORBIDDEN, f"a page of {origins[0]} may not connect; see {self._offer.origin_option}"
-        if access.role_and_path(path) is None:
-            if path not in ("", "/"):
-                return http.HTTPStatus.FORBIDDEN, "the token in the address is wrong"
-            if not self._offer.takes_auth:
-                return http.HTTPStatus.FORBIDDEN, "the address needs the token"
-        return None
+    def _report_refusal(self, text: str) -> None:
+        self._events.emit(EventKind.CUSTOM, self._offer.name, refused=text)
 
     async def _handle(self, connection: Any) -> None:
         """Serve one client until it is gone."""

@@ -36,7 +36,7 @@ def show(
 ) -> None:
     """Print what is found in a URDF: wheels and drive, outline, masses, and slopes, ramps and crests it can take."""
     with readable_errors():
-        from terrain.description.description import describe
+        from terrain.description.describe import describe
         from terrain.description.facts import lines_of, to_json
         from terrain.description.stated import stated_robot
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from terrain.description.description import RobotDescription, footprint_radii
+from terrain.description.description import RobotDescription
+from terrain.description.outline import footprint_radii
 from terrain.description.placeholders import robot_values
 
 

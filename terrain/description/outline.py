@@ -96,3 +96,13 @@ def edge_distance(outline: list[Corner], point: Corner) -> float:
 def as_array(outline: list[Corner]) -> FloatArray:
     """Corners as (n, 2) float64 [m]."""
     return np.array(outline, dtype=np.float64).reshape(-1, 2)
+
+
+def footprint_radii(footprint: list[Corner]) -> tuple[float, float]:
+    """Radii [m] of the largest circle about ``base_link`` inside an outline, and of the smallest one around it."""
+    corners = as_array(footprint)
+    outer = max(math.hypot(x, y) for x, y in corners.tolist())
+    inner = math.inf
+    for (ax, ay), (bx, by) in zip(footprint, [*footprint[1:], footprint[0]], strict=True):
+        inner = min(inner, (ax * by - ay * bx) / math.hypot(bx - ax, by - ay))
+    return max(0.0, inner), outer

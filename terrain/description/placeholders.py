@@ -10,7 +10,8 @@ import re
 from collections.abc import Callable
 
 from mbf_abstract.config.findings import ConfigError, Finding, suggest
-from terrain.description.description import RobotDescription, footprint_radii
+from terrain.description.description import RobotDescription
+from terrain.description.outline import footprint_radii
 
 PLACEHOLDER = re.compile(r"\$ROBOT_[A-Z_]*[A-Z]")
 MOTION_MODELS = {"ackermann": "ackermann", "omni": "omni", "legged": "omni"}

@@ -11,7 +11,7 @@ from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
-from terrain.description.description import footprint_radii
+from terrain.description.outline import footprint_radii
 from terrain.urdf_robots.robot_choice import RobotChoice, spec_of
 
 SMALLER = 0.01

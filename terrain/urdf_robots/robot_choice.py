@@ -11,7 +11,8 @@ import numpy as np
 from pydantic import AfterValidator, Discriminator, Tag
 
 from mbf_abstract.config.findings import ConfigError, Finding
-from terrain.description.description import RobotDescription, describe
+from terrain.description.describe import describe
+from terrain.description.description import RobotDescription
 from terrain.description.mesh_files import find_file
 from terrain.description.parameters import UrdfRobot
 from terrain.description.running_gear import sides_of

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from terrain.description.description import describe
+from terrain.description.describe import describe
 from terrain.description.parameters import UrdfRobot
 
 INERTIA = '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mbf_abstract.config.findings import ConfigError
-from terrain.description.description import describe, footprint_radii
+from terrain.description.describe import describe
+from terrain.description.outline import footprint_radii
 from terrain.description.parameters import UrdfRobot
 from terrain.physics.robot_models import CAR, HUSKY, TURTLEBOT
 from tests.unit.robots.conftest import (

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from mbf_abstract.config.findings import ConfigError
-from terrain.description.description import describe
+from terrain.description.describe import describe
 from terrain.description.parameters import UrdfRobot
 from tests.unit.robots.conftest import BODY, FOUR_WHEELS, joint, link, robot
 
