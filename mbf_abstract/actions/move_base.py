@@ -36,9 +36,10 @@ from mbf_abstract.actions.action import Action, GoalJob
 from mbf_abstract.actions.exe_path import ExePathAction
 from mbf_abstract.actions.get_path import GetPathAction
 from mbf_abstract.actions.meetings import behavior_for_meetings
-from mbf_abstract.actions.move_base_machine import MoveBaseMachine, SubActions, via_of
+from mbf_abstract.actions.move_base_machine import MoveBaseMachine, via_of
 from mbf_abstract.actions.recovery import RecoveryAction
 from mbf_abstract.actions.refine_path import RefinePathAction
+from mbf_abstract.actions.sub_goals import SubActions
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.execution.plan_check import arrival_problem, in_global_frame
 from mbf_abstract.execution.runtime import Runtime

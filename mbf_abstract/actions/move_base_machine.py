@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
-from typing import Any, NamedTuple
+from typing import Any
 
-from mbf_abstract.actions.action import PREEMPTED, Action, GoalJob
-from mbf_abstract.actions.exe_path import ExePathAction
-from mbf_abstract.actions.get_path import GetPathAction
+from mbf_abstract.actions.action import PREEMPTED
 from mbf_abstract.actions.move_base_states import MoveBaseState, Trigger
-from mbf_abstract.actions.recovery import RecoveryAction
 from mbf_abstract.actions.recovery_sequence import RecoverySequence
-from mbf_abstract.actions.refine_path import RefinePathAction
+from mbf_abstract.actions.sub_goals import Job, SubActions, SubGoals
 from mbf_abstract.actions.via_poses import ViaPoses
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.motion_watch import OscillationDetector
@@ -21,14 +17,9 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import (
     ExePathFeedback,
-    ExePathGoal,
-    GetPathGoal,
     GetPathResult,
     MoveBaseFeedback,
     MoveBaseGoal,
-    MoveBaseResult,
-    RecoveryGoal,
-    RefinePathGoal,
     RefinePathResult,
 )
 from mbf_abstract.goals.handle import AnyGoalHandle
@@ -36,22 +27,11 @@ from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from mbf_abstract.server.plugin_table import PluginTable
 from mbf_abstract.time.clock import Stopwatch
 
-SUB_GOAL_SLOT = 255  # so that a client's goal in slot 0 does not preempt a part of move_base
 NO_REPLAN_WITHIN = 0.1  # m from the goal
 LEAST_SHARE_LEFT = 0.25  # of the tolerance, for stopping at the end of a path that does not reach the target
 FATAL = range(ExePathOutcome.INVALID_PATH, ExePathOutcome.INTERNAL_ERROR + 1)
 
-Job = GoalJob[MoveBaseGoal, MoveBaseResult, MoveBaseFeedback]
 End = tuple[int, str]
-
-
-class SubActions(NamedTuple):
-    """The actions that the machine sends goals to."""
-
-    get_path: GetPathAction
-    exe_path: ExePathAction
-    recovery: RecoveryAction
-    refine_path: RefinePathAction
 
 
 def via_of(goal: MoveBaseGoal, runtime: Runtime) -> ViaPoses:
@@ -63,32 +43,21 @@ class MoveBaseMachine:
     """One run of move_base, for one goal or several that take over from each other."""
 
     def __init__(self, sub_actions: SubActions, plugins: PluginTable, job: Job, target: Pose, via: ViaPoses) -> None:
-        self._sub_actions = sub_actions
         self._runtime = job.action.runtime
         self._job = job
         self._target, self._via = target, via
         self._state = MoveBaseState.GET_PATH
-        self._plan: AnyGoalHandle | None = None
-        self._follow: AnyGoalHandle | None = None
-        self._recover: AnyGoalHandle | None = None
+        self._goals = SubGoals(sub_actions, job)
         self._failure: tuple[Trigger, End] | None = None
         self._ending: End | None = None
         self._recoveries = RecoverySequence(self._runtime, plugins)
         self._oscillation = OscillationDetector(self._runtime.clock)
         self._replan_watch = Stopwatch(self._runtime.clock)
         self._planned_floor = self._followed_floor = self._runtime.map_hooks.floors_taken()
-        self._condition = self._runtime.clock.condition()
-        self._mailbox: deque[AnyGoalHandle] = deque()
-
-    def _post(self, handle: AnyGoalHandle) -> None:
-        with self._condition:
-            self._mailbox.append(handle)
-            self._condition.notify_all()
 
     def wake(self) -> None:
         """Look again at the goal: it was canceled, paused or resumed, or a newer one is on offer."""
-        with self._condition:
-            self._condition.notify_all()
+        self._goals.wake()
 
     # ------------------------------------------------------------------------------------ the loop
     def run(self) -> End:
@@ -99,11 +68,10 @@ class MoveBaseMachine:
         try:
             end = None
             while end is None:
-                end = self._react(self._next_message())
+                end = self._react(self._goals.next_message(self._has_news, self._time_to_replan))
             return end
         finally:  # e.g. a replanning that still runs when the robot arrives
-            for handle in self._sub_goals():
-                handle.cancel("move_base is over")
+            self._goals.cancel("move_base is over")
 
     def _react(self, message: AnyGoalHandle | None) -> End | None:
         handle = self._job.handle
@@ -113,58 +81,40 @@ class MoveBaseMachine:
         if self._state is not MoveBaseState.CANCELING:
             self._take_offer()
         if self._state is MoveBaseState.CANCELING:
-            return self._stopped_end() if not self._sub_goals() else None
+            return None if self._goals.unfinished else self._stopped_end()
         if message is None:
             self._replan_if_due()
             return None
         if not message.done:
             return self._on_feedback(message)
-        if message is self._plan:
-            self._plan = None
+        if message is self._goals.plan:
+            self._goals.plan = None
             return self._on_plan(message.result)
-        if message is self._follow:
-            self._follow = None
+        if message is self._goals.follow:
+            self._goals.follow = None
             return self._on_followed(message.result)
-        if message is self._recover:
-            self._recover = None
+        if message is self._goals.recover:
+            self._goals.recover = None
             return self._on_recovered(message.result)
         return None  # a sub-goal that another one has replaced
 
-    def _next_message(self) -> AnyGoalHandle | None:
-        """Wait for a message, a wake-up of the handle, an offer, or the time to replan."""
-        with self._condition:
-            if not self._mailbox and not self._has_news():
-                self._condition.wait(self._time_to_replan())
-            return self._mailbox.popleft() if self._mailbox else None
-
     def _has_news(self) -> bool:
+        """Whether the goal was paused, resumed or canceled, all sub-goals are canceled, or a newer goal is on offer."""
         handle = self._job.handle
-        paused = [self._oscillation.stopwatch.paused, *(sub_goal.paused for sub_goal in self._sub_goals())]
+        paused = [self._oscillation.stopwatch.paused, *(one.paused for one in self._goals.unfinished)]
         if (not handle.paused) in paused:
             return True
         if self._state is MoveBaseState.CANCELING:
-            return not self._sub_goals()
+            return not self._goals.unfinished
         return self._job.offered or handle.cancel_requested
 
     # -------------------------------------------------------------------------------------- planning
     def _ask_for_plan(self) -> None:
-        goal = self._job.handle.goal
         self._replan_watch.restart()
         self._planned_floor = self._runtime.map_hooks.floors_taken()
-        if self._follow is None:
+        if self._goals.follow is None:
             self._enter(MoveBaseState.GET_PATH)
-        self._plan = self._send(
-            self._sub_actions.get_path,
-            GetPathGoal(
-                self._target,
-                planner=goal.planner,
-                dist_tolerance=goal.dist_tolerance,
-                angle_tolerance=goal.angle_tolerance,
-                goal_area=goal.goal_area,
-                via=self._via.plan(),
-                concurrency_slot=SUB_GOAL_SLOT,
-            ),
-        )
+        self._goals.send_plan(self._target, self._via.plan())
 
     def _on_plan(self, result: Any) -> End | None:
         if isinstance(result, RefinePathResult) and result.refined_path is not None:  # the plan itself without success
@@ -174,12 +124,11 @@ class MoveBaseMachine:
             self._recoveries.note_plan()
             refiner = self._runtime.parameters.plan_refiner
             if refiner:
-                goal = RefinePathGoal(result.path, refiner, concurrency_slot=SUB_GOAL_SLOT)
-                self._plan = self._send(self._sub_actions.refine_path, goal)
+                self._goals.send_refinement(result.path, refiner)
             else:
                 self._follow_path(result.path)
             return None
-        if self._follow is None:
+        if self._goals.follow is None:
             failure = (result.outcome, self._via.described(result.message))
             return failure if result.permanent else self._recover_from(Trigger.PLAN, failure)
         return self._on_replan_failed(result)
@@ -204,7 +153,7 @@ class MoveBaseMachine:
     def _time_to_replan(self) -> float | None:
         """Seconds until the next replanning; None while there is none to come."""
         frequency = self._runtime.parameters.planner_frequency
-        driving = self._state is MoveBaseState.EXE_PATH and self._plan is None and not self._job.handle.paused
+        driving = self._state is MoveBaseState.EXE_PATH and self._goals.plan is None and not self._job.handle.paused
         if driving and self._planned_floor != self._runtime.map_hooks.floors_taken():
             return 0.0
         if frequency <= 0.0 or not driving or self._distance_to_goal() <= NO_REPLAN_WITHIN:
@@ -212,29 +161,18 @@ class MoveBaseMachine:
         return max(0.0, 1.0 / frequency - self._replan_watch.elapsed)
 
     def _distance_to_goal(self) -> float:
-        feedback = self._follow.feedback if self._follow is not None and not self._via.left else None
+        feedback = self._goals.follow.feedback if self._goals.follow is not None and not self._via.left else None
         return feedback.dist_to_goal if feedback is not None else float("inf")
 
     # ------------------------------------------------------------------------------------- following
     def _follow_path(self, path: Path) -> None:
-        goal = self._job.handle.goal
-        if self._follow is None:
+        if self._goals.follow is None:
             self._oscillation.reset()
             self._replan_watch.restart()
         self._via.follow(path)
         self._followed_floor = self._planned_floor
         self._enter(MoveBaseState.EXE_PATH)
-        self._follow = self._send(
-            self._sub_actions.exe_path,
-            ExePathGoal(
-                path,
-                controller=goal.controller,
-                dist_tolerance=self._arrival_tolerance(path),
-                angle_tolerance=goal.angle_tolerance,
-                goal_area=goal.goal_area,
-                concurrency_slot=SUB_GOAL_SLOT,
-            ),
-        )
+        self._goals.send_path(path, self._arrival_tolerance(path))
 
     def _arrival_tolerance(self, path: Path) -> float | None:
         """What a path that ends off the target leaves of the tolerance [m]; None = the server's."""
@@ -251,7 +189,7 @@ class MoveBaseMachine:
         return self._runtime.parameters.dist_tolerance if given is None else given
 
     def _on_feedback(self, message: AnyGoalHandle) -> End | None:
-        if message is not self._follow or message.feedback is None or self._state is not MoveBaseState.EXE_PATH:
+        if message is not self._goals.follow or message.feedback is None or self._state is not MoveBaseState.EXE_PATH:
             return None
         feedback: ExePathFeedback = message.feedback
         self._via.note_progress(feedback.distance_along_path, self._dist_tolerance)
@@ -274,9 +212,7 @@ class MoveBaseMachine:
             return MoveBaseOutcome.SUCCESS, result.message
         if result.outcome in FATAL:
             return result.outcome, result.message
-        if self._plan is not None:
-            self._plan.cancel("following failed")
-            self._plan = None
+        self._goals.cancel_plan("following failed")
         if result.outcome == ExePathOutcome.OSCILLATION:
             return self._recover_from(Trigger.OSCILLATION, (MoveBaseOutcome.OSCILLATION, result.message))
         return self._recover_from(Trigger.CONTROL, (result.outcome, result.message))
@@ -289,7 +225,7 @@ class MoveBaseMachine:
         if not behavior:
             return failure[0], self._recoveries.described(failure[1])
         self._enter(MoveBaseState.RECOVERY, behavior=behavior, trigger=trigger.value, failure=failure[1])
-        self._recover = self._send(self._sub_actions.recovery, RecoveryGoal(behavior, concurrency_slot=SUB_GOAL_SLOT))
+        self._goals.send_recovery(behavior)
         return None
 
     def _on_recovered(self, result: Any) -> End | None:
@@ -313,30 +249,25 @@ class MoveBaseMachine:
             self._end_after_stop((MoveBaseOutcome.TF_ERROR, str(error)))
             return
         if self._state in (MoveBaseState.GET_PATH, MoveBaseState.EXE_PATH):
-            if self._plan is not None:
-                self._plan.cancel(PREEMPTED)
+            self._goals.cancel_plan(PREEMPTED)
             self._ask_for_plan()
             self._enter(MoveBaseState.GET_PATH)
 
     def _cancel_sub_goals(self, state: MoveBaseState) -> None:
         self._enter(state)
-        for handle in self._sub_goals():
-            handle.cancel("move_base ends it")
-
-    def _sub_goals(self) -> list[AnyGoalHandle]:
-        return [h for h in (self._plan, self._follow, self._recover) if h is not None and not h.done]
+        self._goals.cancel("move_base ends it")
 
     def _stop_then_recover(self, trigger: Trigger, failure: End) -> None:
         """Stop following; its end starts the recovery."""
         self._failure = trigger, failure
         self._cancel_sub_goals(MoveBaseState.STOPPING)
-        self._plan = None
+        self._goals.plan = None
 
     def _end_after_stop(self, end: End) -> End | None:
         """End the goal with ``end`` once all sub-goals are over."""
         self._ending = end
         self._cancel_sub_goals(MoveBaseState.CANCELING)
-        return None if self._sub_goals() else end
+        return None if self._goals.unfinished else end
 
     def _go_on_after_stop(self) -> End | None:
         """The robot stands: recover from what made it stop, or plan for a goal that took over meanwhile."""
@@ -353,16 +284,7 @@ class MoveBaseMachine:
         paused = self._job.handle.paused
         for watch in (self._oscillation.stopwatch, self._replan_watch):
             watch.pause() if paused else watch.resume()
-        for handle in self._sub_goals():
-            handle.pause() if paused else handle.resume()
-
-    def _send(self, action: Action[Any, Any, Any], goal: object) -> AnyGoalHandle:
-        handle: AnyGoalHandle = action.send(goal)
-        if self._job.handle.paused:
-            handle.pause()
-        handle.on_wake(self.wake)
-        handle.subscribe(self._post)
-        return handle
+        self._goals.set_paused(paused)
 
     def _enter(self, state: MoveBaseState, **why: object) -> None:
         if state is not self._state or why:

@@ -11,7 +11,7 @@ from contextlib import suppress
 from importlib.util import find_spec
 from typing import Any
 
-from mbf_abstract.actions.move_base_machine import SUB_GOAL_SLOT
+from mbf_abstract.actions.sub_goals import SUB_GOAL_SLOT
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose, normalize_angle
 from mbf_abstract.goals.goal_types import (
