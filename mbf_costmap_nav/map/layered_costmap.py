@@ -15,15 +15,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import numpy as np
-
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.view import FloorMap, FloorWindow
-from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
+from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.map.layer import CostmapLayer, shifted
+from mbf_costmap_nav.map.cell_window import CellWindow
+from mbf_costmap_nav.map.layer import CostmapLayer
 from mbf_costmap_nav.map.snapshot_answers import SnapshotAnswers
 
 
@@ -51,8 +50,6 @@ class LayeredCostmap(SnapshotAnswers):
 
     Attributes
     ----------
-    geometry : GridGeometry
-        The current grid; it moves with the robot if the window rolls.
     last_update : float or None
         Time [s] of the last update; None before the first one.
 
@@ -79,20 +76,20 @@ class LayeredCostmap(SnapshotAnswers):
         self.layers: LayerStack[CostmapLayer] = LayerStack(layers)
         self.frame_id = frame_id
         self.rolling_window = rolling_window
-        geometry = self._preferred_geometry() or geometry
         self.max_age = max_age
-        self._default_cost = UNKNOWN if track_unknown_space else FREE
-        self.geometry = geometry
-        self._cells = self._default_cells()
+        geometry = self._preferred_geometry() or geometry
+        self._window = CellWindow(geometry, UNKNOWN if track_unknown_space else FREE, frame_id)
         self._footprint_padding = footprint_padding
-        self._version = 0
         self.last_update: float | None = None
-        self._pending = geometry.box
-        self._snapshot: Costmap | None = None
         self._unmoved: set[str] = set()  # names of layers whose cells are not those of the window, or of their floor
         for layer in layers:
             layer.match_geometry(geometry)
         self.set_footprint(footprint)
+
+    @property
+    def geometry(self) -> GridGeometry:
+        """The current grid; it moves with the robot if the window rolls."""
+        return self._window.geometry
 
     # ------------------------------------------------------------------------------------------------- floors
     @property
@@ -117,11 +114,7 @@ class LayeredCostmap(SnapshotAnswers):
     def snapshot(self) -> Costmap:
         """Read-only copy of the map as of the last update; the same object until the map changes."""
         with self._lock:
-            if self._snapshot is None:
-                cells = self._cells.copy()
-                cells.flags.writeable = False
-                self._snapshot = self._costmap(cells)
-            return self._snapshot
+            return self._window.snapshot(self.last_update or 0.0)
 
     def permanent_costmap(self) -> Costmap | None:
         """Costs that the permanent layers alone give, as if no sensor saw anything.
@@ -135,18 +128,11 @@ class LayeredCostmap(SnapshotAnswers):
             if self.rolling_window or self.last_update is None or not safe:
                 return None
             permanent = [layer for layer in layers if layer.permanent]
-            self._pending = self.geometry.box  # layers may keep notes of the cells they are asked for
-            cells = self._default_cells()
+            self._window.recompute_all()  # layers may keep notes of the cells they are asked for
+            cells = self._window.default_cells()
             for layer in permanent:
                 layer.update_costs(cells, self.geometry.box)
-            return self._costmap(cells) if permanent else None
-
-    def _default_cells(self) -> CellArray:
-        return np.full((self.geometry.height, self.geometry.width), self._default_cost, dtype=np.uint8)
-
-    def _costmap(self, cells: CellArray) -> Costmap:
-        grid, stamp = self.geometry, self.last_update or 0.0
-        return Costmap(cells, grid.resolution, grid.origin_x, grid.origin_y, self.frame_id, stamp, self._version)
+            return self._window.costmap(cells, self.last_update) if permanent else None
 
     def stale_reason(self, now: float) -> str:
         """Why the map is not current at ``now`` [s]: its age, a layer that raised, a silent sensor; empty if it is."""
@@ -202,15 +188,15 @@ class LayeredCostmap(SnapshotAnswers):
                 self._unmoved.discard(name)
             if self.rolling_window and robot_pose is not None:
                 self._follow(robot_pose)
-            box = self._pending
-            self._pending = self.geometry.box  # stays so if a layer raises: the next update then repairs everything
+            box = self._window.pending
+            self._window.recompute_all()  # stays so if a layer raises: the next update then repairs everything
             for layer in self.layers.enabled:
                 with self.layers.computing(layer):
                     box = layer.update_bounds(robot_pose, now, box)
             box = box.clipped(self.geometry.box)
             if not box.empty:
                 self._recompute(box)
-            self._pending = EMPTY_BOX
+            self._window.pending = EMPTY_BOX
             self.layers.problem = ""
             self.last_update = now
             return EMPTY_BOX if box.empty else box
@@ -222,18 +208,12 @@ class LayeredCostmap(SnapshotAnswers):
                 if layer.place_floor():
                     self.floors_taken += 1
                     self._unmoved.add(layer.name)
-                    self._block()
+                    self._window.forbid_all()
         geometry = self._preferred_geometry()
         if geometry is not None and geometry != self.geometry:
-            self.geometry = geometry
+            self._window.geometry = geometry
             self._unmoved |= set(self.layers)
-            self._block()
-
-    def _block(self) -> None:
-        """Forbid all cells until the update is done: if a layer raises now, nobody plans over the last floor."""
-        self._cells = np.full((self.geometry.height, self.geometry.width), LETHAL, dtype=np.uint8)
-        self._pending, self._snapshot = self.geometry.box, None
-        self._version += 1
+            self._window.forbid_all()
 
     def _preferred_geometry(self) -> GridGeometry | None:
         """Grid that a layer wants the map to have; None if none wants one, or the window rolls."""
@@ -241,27 +221,16 @@ class LayeredCostmap(SnapshotAnswers):
         return next(filter(None, wanted), None)
 
     def _recompute(self, box: CellBox) -> None:
-        self._cells[box.slices] = self._default_cost
-        for layer in self.layers.enabled:
-            with self.layers.computing(layer):
-                layer.update_costs(self._cells, box)
-        self._version += 1
-        self._snapshot = None
+        with self._window.writing(box) as cells:
+            for layer in self.layers.enabled:
+                with self.layers.computing(layer):
+                    layer.update_costs(cells, box)
 
     def _follow(self, robot_pose: Pose) -> None:
-        """Move the window so that the robot is in its middle; origins stay multiples of the resolution."""
-        grid = self.geometry
-        ix = round(robot_pose.x / grid.resolution - grid.width / 2)
-        iy = round(robot_pose.y / grid.resolution - grid.height / 2)
-        dx = ix - round(grid.origin_x / grid.resolution)
-        dy = iy - round(grid.origin_y / grid.resolution)
+        """Move the window so that the robot is in its middle, and the layers with it."""
+        dx, dy = self._window.centre_on(robot_pose)
         if dx == 0 and dy == 0:
             return
-        self.geometry = GridGeometry(
-            grid.width, grid.height, grid.resolution, ix * grid.resolution, iy * grid.resolution
-        )
-        self._cells = shifted(self._cells, dx, dy, self._default_cost)
-        self._pending = self.geometry.box
         self._unmoved |= set(self.layers)
         for layer in self.layers.values():
             with self.layers.computing(layer):
@@ -285,13 +254,13 @@ class LayeredCostmap(SnapshotAnswers):
             self.footprint = footprint.padded(self._footprint_padding)
             for layer in self.layers.values():
                 layer.set_footprint(self.footprint)
-            self._pending = self.geometry.box
+            self._window.recompute_all()
 
     def _replace_parameters(self, name: str, parameters: LayerParameters) -> None:
         """Give a layer its parameters; the effect is visible after the next update, which recomputes everything."""
         layer = self.layers[name]
         old, layer.parameters = layer.parameters, parameters
-        self._pending = self.geometry.box
+        self._window.recompute_all()
         try:
             layer.parameters_changed()
         except BaseException:
@@ -309,7 +278,7 @@ class LayeredCostmap(SnapshotAnswers):
             chosen = self.layers.chosen(layer_names)
             for layer in chosen:
                 layer.reset()
-            self._pending = self.geometry.box
+            self._window.recompute_all()
         return [layer.name for layer in chosen]
 
     def clear_area(
@@ -328,5 +297,5 @@ class LayeredCostmap(SnapshotAnswers):
             window = CellBox(x0 + 1, y0 + 1, x1, y1)  # costmap_2d's window leaves out its border cells
             for layer in chosen:
                 layer.clear_area(window, inside)
-            self._pending = self.geometry.box
+            self._window.recompute_all()
         return [layer.name for layer in chosen]

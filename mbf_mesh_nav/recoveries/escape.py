@@ -89,20 +89,20 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
         if not snapshot.blocked(p.cost_limit)[mesh_map.faces[spot.face]].any():
             return RecoveryResult(RecoveryOutcome.SUCCESS, "the robot stands on safe surface")
         own_patch = self._patch_below(spot, snapshot, flag)
-        way = self._escape_path(spot, own_patch, request)
+        path = self._escape_path(spot, own_patch, request)
 
         def velocity(pose: Pose) -> Twist | RecoveryResult:
-            nonlocal way
+            nonlocal path
             now = mesh_map.snapshot()
-            if way is not None:
-                way.tracker.update(pose.position)
-                if not way.is_open(_lethal(now) & ~own_patch, now.blocked(p.cost_limit)):
+            if path is not None:
+                path.tracker.update(pose.position)
+                if not path.is_open(_lethal(now) & ~own_patch, now.blocked(p.cost_limit)):
                     here = mesh_map.locate_one(pose.position, SURFACE_DISTANCE)
-                    way = None if here is None else self._escape_path(here, own_patch, request)
-            if way is None:
+                    path = None if here is None else self._escape_path(here, own_patch, request)
+            if path is None:
                 message = f"no safe surface within {p.max_distance:g} m over the surface"
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, message)
-            return self._drive(pose, way.tracker)
+            return self._drive(pose, path.tracker)
 
         return self.drive(request, velocity)
 
