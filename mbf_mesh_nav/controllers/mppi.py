@@ -277,27 +277,7 @@ class MPPIController(MeshController):
         snapshot = mesh_map.snapshot()
         pieces = self._pieces_of_a_step()
         motions = np.repeat(self._as_motions(controls), pieces, axis=1)
-        reach = p.max_vel_x * p.time_steps * p.model_dt + 1.0
-        tracker = self._tracker
-        end = min(tracker.progress + reach, tracker.next_cusp)
-        along = np.append(np.arange(tracker.progress, end, _PATH_SPACING), end)
-        ahead, remaining = tracker.points_at(along), tracker.next_cusp - along
-        backward = self._reverses and tracker.driving_backward
-        if p.motion_model == "ackermann" and (end == tracker.length or (self._reverses and end == tracker.next_cusp)):
-            # Beyond the end, for the critic that looks along the path: it shows how to stand there. A cusp draws the
-            # car past itself, or it would creep to it.
-            ahead = np.concatenate([ahead, self._run_out(end)])
-            beyond = np.zeros(len(_RUN_OUT)) if end == tracker.length else -_RUN_OUT[:, 0]
-            remaining = np.append(remaining, beyond)
-        strictness = _STRICTNESS if tracker.remaining < self._strict_below else 1.0
-        weights = (
-            strictness * p.path_weight,
-            p.cost_weight,
-            p.tilt_weight,
-            p.turn_weight,
-            p.goal_weight,
-            p.heading_weight,
-        )
+        ahead, remaining = self._path_ahead()
         poses = np.empty((3, motions.shape[1] if around.anybody else 0, len(motions)), dtype=np.float32)
         scores, collided = score_rollouts(
             mesh_map.vertices,
@@ -313,12 +293,38 @@ class MPPIController(MeshController):
             p.model_dt / pieces,
             ahead,
             remaining,
-            np.array(weights),
+            self._weights(),
             (p.roll_limit, p.pitch_limit),
-            -1.0 if backward else 1.0,
+            -1.0 if self._backward else 1.0,
             poses,
         )
         return scores, collided, around.meet(poses, p.model_dt / pieces)
+
+    @property
+    def _backward(self) -> bool:
+        """Whether the present section of the path is driven in reverse."""
+        return self._reverses and self._tracker.driving_backward
+
+    def _weights(self) -> FloatArray:
+        """Weights of the critics, in the order of ``score_rollouts``."""
+        p = self.parameters
+        path_weight = (_STRICTNESS if self._tracker.remaining < self._strict_below else 1.0) * p.path_weight
+        return np.array([path_weight, p.cost_weight, p.tilt_weight, p.turn_weight, p.goal_weight, p.heading_weight])
+
+    def _path_ahead(self) -> tuple[FloatArray, FloatArray]:
+        """Points (n, 3) of the path that motions can reach, and the length (n,) [m] of it that is left from each."""
+        p, tracker = self.parameters, self._tracker
+        reach = p.max_vel_x * p.time_steps * p.model_dt + 1.0
+        end = min(tracker.progress + reach, tracker.next_cusp)
+        along = np.append(np.arange(tracker.progress, end, _PATH_SPACING), end)
+        ahead, remaining = tracker.points_at(along), tracker.next_cusp - along
+        if p.motion_model == "ackermann" and (end == tracker.length or (self._reverses and end == tracker.next_cusp)):
+            # Beyond the end, for the critic that looks along the path: it shows how to stand there. A cusp draws the
+            # car past itself, or it would creep to it.
+            ahead = np.concatenate([ahead, self._run_out(end)])
+            beyond = np.zeros(len(_RUN_OUT)) if end == tracker.length else -_RUN_OUT[:, 0]
+            remaining = np.append(remaining, beyond)
+        return ahead, remaining
 
     def _run_out(self, end: float) -> FloatArray:
         """Points (3, 3) straight on beyond ``end`` [m] of the path: beyond a cusp, or beyond the goal as it looks."""
@@ -326,7 +332,7 @@ class MPPIController(MeshController):
         if end == tracker.length:
             assert self._approach is not None
             goal = self._approach.goal
-            ahead = -goal.rotation[:, 0] if self._reverses and tracker.driving_backward else goal.rotation[:, 0]
+            ahead = -goal.rotation[:, 0] if self._backward else goal.rotation[:, 0]
             return np.asarray(goal.position) + _RUN_OUT * ahead
         before, corner = tracker.points_at(np.array([end - _PATH_SPACING, end]))
         return np.asarray(corner + _RUN_OUT / _PATH_SPACING * (corner - before))
