@@ -20,12 +20,13 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.maps.layers.layer_list import PlannedLayer
+from mbf_mesh_nav.arrays import BoolArray, IntArray
 from mbf_mesh_nav.map.layer import MeshLayer
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, compute_layers, plan_mesh_layers
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.mesh.topology import build_topology
+from mbf_mesh_nav.mesh.topology import MeshTopology, build_topology
 from mbf_mesh_nav.tiles.index import INDEX_FILE, CostProfile, TileEntry, TileIndex, read_index, write_index
 from mbf_mesh_nav.tiles.portals import group_shared
 from mbf_mesh_nav.tiles.sources import TilePart, TileSource
@@ -132,10 +133,7 @@ class TileBuilder:
         place[order] = np.arange(len(order), dtype=np.int32)
         core = order[: int(is_core.sum())]
         # 3. The vertex graph of the core.
-        starts = np.repeat(np.arange(topology.vertex_count), np.diff(topology.neighbour_offsets))
-        kept = is_core[starts] & is_core[topology.neighbours]
-        offsets = np.zeros(len(core) + 1, dtype=np.int32)
-        np.cumsum(np.bincount(place[starts[kept]], minlength=len(core)), out=offsets[1:])
+        offsets, neighbours = _graph_of_core(topology, is_core, place)
         # 4. Vertices that cores of other tiles have, too, and the portals they form.
         is_shared = np.zeros(topology.vertex_count, dtype=np.bool_)
         is_shared[topology.faces[~is_core_face]] = True
@@ -151,7 +149,7 @@ class TileBuilder:
             core_faces=np.array([part.core_faces]),
             normals=topology.vertex_normals[core].astype(np.float32),
             offsets=offsets,
-            neighbours=place[topology.neighbours[kept]],
+            neighbours=neighbours,
             costs=costs,
             lethal=lethal,
             shared=shared,
@@ -167,6 +165,15 @@ class TileBuilder:
     def _passing(self, tile: Tile, profile: CostProfile) -> np.ndarray[Any, np.dtype[np.float32]]:
         row = self.layers.index(profile.layer or self.default_layer)
         return costs_between_portals(tile, tile.costs[row], tile.lethal[row], profile)
+
+
+def _graph_of_core(topology: MeshTopology, is_core: BoolArray, place: IntArray) -> tuple[IntArray, IntArray]:
+    """Offsets and neighbours of the core's vertices, which come first in the order ``place`` (V,)."""
+    starts = np.repeat(np.arange(topology.vertex_count), np.diff(topology.neighbour_offsets))
+    kept = is_core[starts] & is_core[topology.neighbours]
+    offsets = np.zeros(int(is_core.sum()) + 1, dtype=np.int32)
+    np.cumsum(np.bincount(place[starts[kept]], minlength=len(offsets) - 1), out=offsets[1:])
+    return offsets, place[topology.neighbours[kept]]
 
 
 def build_tiles(
@@ -197,31 +204,9 @@ def build_tiles(
         The folder holds another map, a file cannot be written, the source has no face; as of ``TileBuilder``.
     """
     builder = TileBuilder(source, settings)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise MeshError(str(folder), [f"cannot be made: {error}"]) from error
-    if (folder / INDEX_FILE).exists() and read_index(folder).build != builder.build:
-        raise MeshError(str(folder), ["holds a map of another source or with other settings; give another folder"])
-    for unfinished in folder.glob(".tile_*.npz"):
-        unfinished.unlink(missing_ok=True)
-    keys = source.keys(settings.tile_size)
-
-    def build(key: TileKey) -> TileEntry | None:
-        return _entry_of(builder, tile_file(folder, key), key)
-
-    entries = []
-    with ThreadPoolExecutor(max_workers=workers) as pool:
-        futures = [pool.submit(build, key) for key in keys]
-        try:
-            for done, future in enumerate(as_completed(futures), start=1):
-                entries.append(future.result())
-                on_tile(done, len(keys))
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-    found = sorted((entry for entry in entries if entry is not None), key=lambda entry: entry.key)
-    if not found:
+    _prepare(folder, builder.build)
+    entries = _build_all(builder, folder, source.keys(settings.tile_size), workers, on_tile)
+    if not entries:
         raise MeshError(name or "tiles", ["there is no face in it"])
     index = TileIndex(
         build=builder.build,
@@ -233,10 +218,39 @@ def build_tiles(
         layers=builder.layers,
         default_layer=builder.default_layer,
         profiles=settings.all_profiles(),
-        tiles=tuple(found),
+        tiles=tuple(entries),
     )
     write_index(folder, index)
     return index
+
+
+def _prepare(folder: Path, build: str) -> None:
+    """Make the folder, or check that it holds the same map; remove what a broken build has left."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MeshError(str(folder), [f"cannot be made: {error}"]) from error
+    if (folder / INDEX_FILE).exists() and read_index(folder).build != build:
+        raise MeshError(str(folder), ["holds a map of another source or with other settings; give another folder"])
+    for unfinished in folder.glob(".tile_*.npz"):
+        unfinished.unlink(missing_ok=True)
+
+
+def _build_all(
+    builder: TileBuilder, folder: Path, keys: list[TileKey], workers: int, on_tile: Callable[[int, int], None]
+) -> list[TileEntry]:
+    """Entries of all tiles with a face, sorted by their keys; builds those that are missing."""
+    entries = []
+    with ThreadPoolExecutor(max_workers=workers) as pool:
+        futures = [pool.submit(_entry_of, builder, tile_file(folder, key), key) for key in keys]
+        try:
+            for done, future in enumerate(as_completed(futures), start=1):
+                entries.append(future.result())
+                on_tile(done, len(keys))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    return sorted((entry for entry in entries if entry is not None), key=lambda entry: entry.key)
 
 
 def _entry_of(builder: TileBuilder, path: Path, key: TileKey) -> TileEntry | None:

@@ -76,12 +76,8 @@ def find_place(key: TileKey, tile: Tile, seen: TileGraph, position: FloatArray, 
     if not touched[: tile.core_vertices].any():
         return None
     touched[tile.faces[_any_corner(touched, tile.faces)]] = True
-    chosen: IntArray = np.flatnonzero(_any_corner(touched, tile.faces)).astype(np.int32)
-    vertices, faces = np.unique(tile.faces[chosen], return_inverse=True)
-    corners: IntArray = faces.reshape(-1, 3).astype(np.int32)
-    own = np.arange(len(vertices), dtype=np.int32)
-    topology = build_topology(CheckedMesh(tile.vertices[vertices], corners, own, chosen, own))
-    around = MeshMap(topology)
+    around, internal = _part_of(tile, np.flatnonzero(_any_corner(touched, tile.faces)).astype(np.int32))
+    topology = around.topology
     # 2. The nearest of them has to be one of the core, or one of the core as near.
     point = on_surface(topology, around.locator, position, reach)
     if point is not None:
@@ -89,15 +85,8 @@ def find_place(key: TileKey, tile: Tile, seen: TileGraph, position: FloatArray, 
     if point is None:
         return None
     # 3. What the tile knows of its corners.
-    internal = vertices[topology.internal_to_input]
-    is_core = internal < tile.core_vertices
-    costs = np.full(len(internal), np.inf, dtype=np.float32)
-    costs[is_core] = seen.snapshot.costs[internal[is_core]]
-    lethal, blocked = ~is_core, ~is_core
-    lethal[is_core] = seen.snapshot.lethal[internal[is_core]]
-    blocked[is_core] = seen.graph.blocked[internal[is_core]]
-    no_edges = np.zeros(0, dtype=np.float32)
-    snapshot = MeshSnapshot(0, costs, lethal, no_edges, seen.snapshot.edge_cost_factor)
+    snapshot, blocked = _seen_at(seen, internal, internal < tile.core_vertices)
+    costs, lethal = snapshot.costs, snapshot.lethal
     free, corner_costs = corner_distances(around, blocked, point, snapshot)
     nearest = nearest_corner(around, point)
     reason = f"cost {costs[nearest]:.3g}{' (lethal)' if lethal[nearest] else ''}" if blocked[nearest] else ""
@@ -114,6 +103,26 @@ def find_place(key: TileKey, tile: Tile, seen: TileGraph, position: FloatArray, 
         face_around=point.face,
         snapshot=snapshot,
     )
+
+
+def _part_of(tile: Tile, chosen: IntArray) -> tuple[MeshMap, IntArray]:
+    """Map of some faces of a tile, and which vertices of the tile its vertices are."""
+    vertices, faces = np.unique(tile.faces[chosen], return_inverse=True)
+    corners: IntArray = faces.reshape(-1, 3).astype(np.int32)
+    own = np.arange(len(vertices), dtype=np.int32)
+    topology = build_topology(CheckedMesh(tile.vertices[vertices], corners, own, chosen, own))
+    return MeshMap(topology), vertices[topology.internal_to_input]
+
+
+def _seen_at(seen: TileGraph, vertices: IntArray, is_core: BoolArray) -> tuple[MeshSnapshot, BoolArray]:
+    """Costs of some vertices of a tile, and which are blocked (n,); all that do not belong to its core are."""
+    costs = np.full(len(vertices), np.inf, dtype=np.float32)
+    costs[is_core] = seen.snapshot.costs[vertices[is_core]]
+    lethal, blocked = ~is_core, ~is_core
+    lethal[is_core] = seen.snapshot.lethal[vertices[is_core]]
+    blocked[is_core] = seen.graph.blocked[vertices[is_core]]
+    no_edges = np.zeros(0, dtype=np.float32)
+    return MeshSnapshot(0, costs, lethal, no_edges, seen.snapshot.edge_cost_factor), blocked
 
 
 def _within(vertices: FloatArray, position: FloatArray, reach: float) -> IntArray:
