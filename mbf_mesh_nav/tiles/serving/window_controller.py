@@ -16,32 +16,16 @@ from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult, PlannedMotion
 from mbf_mesh_nav.plugins import MeshController
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
-from mbf_mesh_nav.tiles.serving.parts import on_part
+from mbf_mesh_nav.tiles.serving.parts import OnWindow
 
 
-class WindowController(AbstractController):
-    """Hands everything to a controller on the present window.
-
-    Parameters
-    ----------
-    controller_class : type
-    context : MapContext
-        With a map of tiles that has a window.
-
-    Raises
-    ------
-    ValueError
-        The window is too small for it.
-    """
+class WindowController(OnWindow[MeshController], AbstractController):
+    """Hands everything to a controller on the present window."""
 
     def __init__(self, controller_class: type[MeshController], context: MapContext[TiledNavigationMap]) -> None:
-        super().__init__(context)
-        self._class, self._context, self._map = controller_class, context, context.navigation_map
-        self._map.require_room(controller_class.reach(self.parameters))
+        super().__init__(controller_class, context)
         self._tracker: PathTracker | None = None
         self._accepted = True
-        self._inner = self._made()
-        self.modelled_compute_time = self._inner.modelled_compute_time
 
     @property
     def turns_on_the_spot(self) -> bool:
@@ -70,17 +54,13 @@ class WindowController(AbstractController):
         self._follow(pose)
         return self._on_window().is_goal_reached(pose, dist_tolerance, angle_tolerance)
 
-    def cancel(self) -> bool:
-        """As the controller."""
-        return self._inner.cancel()
-
     def planned_motion(self) -> PlannedMotion | None:
         """As the controller."""
         return self._inner.planned_motion()
 
     def parameters_changed(self) -> None:
         """Hand them on; those that the controller refuses, or with which it looks beyond the window, are not kept."""
-        self._map.require_room(self._class.reach(self.parameters))
+        self._require_room()
         old, self._inner.parameters = self._inner.parameters, self.parameters
         try:
             self._inner.parameters_changed()
@@ -99,9 +79,6 @@ class WindowController(AbstractController):
             if self._tracker is not None:
                 self._accepted = self._inner.set_plan(_left(self._tracker))
         return self._inner
-
-    def _made(self) -> MeshController:
-        return on_part(self._class, self._context, self.parameters, self._map.window_map)
 
 
 def _left(tracker: PathTracker) -> Path:
