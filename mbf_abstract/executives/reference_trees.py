@@ -28,11 +28,13 @@ from mbf_abstract.executives.recovering import (
     InOrder,
     MemRec,
     OutcomeGuard,
+    PickByMotion,
     PickByOutcome,
     RecoveryNode,
     RoundRobin,
 )
 from mbf_abstract.executives.watchdogs import MotorWatchdog, OscillationWatchdog, ProgressWatchdog
+from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome
 
 BLOCKED = (ExePathOutcome.BLOCKED_PATH, ExePathOutcome.BLOCKED_GOAL, ExePathOutcome.NO_VALID_CMD)
@@ -56,6 +58,9 @@ class TreeOptions:
         Every plan goes through it; empty = none.
     clear, out_of_collision, relax_planner, relax_controller, move_away : str
         Recovery behaviours by what they are for; empty = none.
+    wait, give_way : str
+        Where a tracked object blocks the path: ``wait`` for one that moves; for one that stands ``wait``, then
+        ``give_way``; one that is parked is planned around at once. Empty, the default: nobody asks.
     check_poses : bool
         Whether navigation first looks whether robot and goal stand free.
     second_planner_pause : float
@@ -85,6 +90,8 @@ class TreeOptions:
     relax_planner: str = ""
     relax_controller: str = ""
     move_away: str = ""
+    wait: str = ""
+    give_way: str = ""
     check_poses: bool = True
     second_planner_pause: float = 8.0
     second_planner_look_ahead: float = 3.0
@@ -172,11 +179,21 @@ def _recovery(options: TreeOptions) -> Behaviour:
         return OutcomeGuard("any failure", _in_turn("fixed order", *names), recovery_would_help)
     guards = [
         OutcomeGuard("in contact", _in_turn("free", o.out_of_collision, o.move_away, o.clear), IN_CONTACT),
-        OutcomeGuard("blocked", _in_turn("unblock", o.clear, o.relax_controller, o.out_of_collision), BLOCKED),
+        OutcomeGuard("blocked", _unblock(options), BLOCKED),
         OutcomeGuard("off the path", _in_turn("loosen", o.relax_controller, o.clear), OFF_THE_PATH),
         OutcomeGuard("other", _in_turn("others", o.clear, o.relax_controller, o.move_away), recovery_would_help),
     ]
     return PickByOutcome("recover by outcome", guards)
+
+
+def _unblock(options: TreeOptions) -> Behaviour:
+    """Clear, loosen and back up in turn; but where somebody is in the way, what fits how that one moves."""
+    o = options
+    usual = _in_turn("unblock", o.clear, o.relax_controller, o.out_of_collision)
+    if not (o.wait and o.give_way):
+        return usual
+    by_motion = {Motion.MOVING: Recovery(o.wait), Motion.WAITING: _in_turn("yield", o.wait, o.give_way)}
+    return PickByMotion("who is in the way?", by_motion, nobody=usual)
 
 
 def _in_turn(name: str, *behaviors: str) -> RoundRobin:

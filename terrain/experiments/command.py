@@ -6,6 +6,7 @@ import typer
 
 from terrain.experiments.evaluation import command as evaluation
 from terrain.experiments.table1 import command as table1
+from terrain.experiments.table1.main_run import command as table1_main
 
 
 def register(app: typer.Typer) -> None:
@@ -14,6 +15,7 @@ def register(app: typer.Typer) -> None:
     bench.callback()(_group)
     evaluation.register(bench)
     table1.register(bench)
+    table1_main.register(bench)
     app.add_typer(bench, name="bench")
 
 

@@ -121,23 +121,31 @@ Executive = ClassicMoveBase | TreeExecutive
 def make_executive(condition: Condition, navigator: Navigator) -> Executive:
     """Make the condition's executive and give the server the condition's limits."""
     if condition.executive == "tree":
-        return _make_tree(condition, navigator)
+        return make_tree(condition, navigator, tree_options(condition))
     settings = ClassicSettings(recovery_behaviors=RECOVERIES, **asdict(condition.limits))
     kind = FilteredMoveBase if condition.executive == "filtered_move_base" else ClassicMoveBase
     return kind(navigator, settings, planner="main", controller="follow")
 
 
-def _make_tree(condition: Condition, navigator: Navigator) -> TreeExecutive:
-    limits, shape = condition.limits, asdict(condition.tree)
+def make_tree(condition: Condition, navigator: Navigator, options: TreeOptions) -> TreeExecutive:
+    """Give the server the condition's limits and make the navigation tree of these options."""
+    limits = condition.limits
     navigator.server.set_parameters(
         planner_patience=limits.planner_patience,
         planner_max_retries=limits.max_planning_retries,
         controller_patience=limits.controller_patience,
-        controller_max_retries=shape.pop("controller_max_retries"),
+        controller_max_retries=condition.tree.controller_max_retries,
         oscillation_timeout=limits.oscillation_timeout,
     )
+    return TreeExecutive(navigation_tree(options), navigator, CONTROL_PERIOD)
+
+
+def tree_options(condition: Condition) -> TreeOptions:
+    """Return the options of the condition's tree."""
+    shape = asdict(condition.tree)
+    del shape["controller_max_retries"]
     clear, relax_planner, out_of_collision, relax_controller, escape_distance = RECOVERIES
-    options = TreeOptions(
+    return TreeOptions(
         planner="main",
         second_planner="second",
         controller="follow",
@@ -149,4 +157,3 @@ def _make_tree(condition: Condition, navigator: Navigator) -> TreeExecutive:
         progress_timeout=0.0,
         **shape,
     )
-    return TreeExecutive(navigation_tree(options), navigator, CONTROL_PERIOD)

@@ -93,13 +93,17 @@ def run_repetition(condition: Condition, world: Path, seed: int, legs: int | Non
     """
     started = wall_seconds()
     with _open_environment(world, condition.surroundings, seed) as environment:
-        executive = make_executive(condition, environment.navigator)
-        deadline = _Deadline(executive, environment.clock)
-        environment.loop.on_sample.append(deadline.watch)
-        for number, goal in enumerate(environment.goals[:legs]):
-            _drive_leg(environment, executive, deadline, number, goal)
-        events, digest = environment.memory.events, environment.digest.hexdigest()
-        track = np.array([(pose.x, pose.y) for pose in environment.simulation.track[::TRACK_SPACING]])
+        return drive(environment, make_executive(condition, environment.navigator), started, legs)
+
+
+def drive(environment: Environment, executive: Executive, started: float, legs: int | None = None) -> Repetition:
+    """Drive to the goals of an environment (the first ``legs`` of them); ``started``: ``wall_seconds()`` before it."""
+    deadline = _Deadline(executive, environment.clock)
+    environment.loop.on_sample.append(deadline.watch)
+    for number, goal in enumerate(environment.goals[:legs]):
+        _drive_leg(environment, executive, deadline, number, goal)
+    events, digest = environment.memory.events, environment.digest.hexdigest()
+    track = np.array([(pose.x, pose.y) for pose in environment.simulation.track[::TRACK_SPACING]])
     recovery_goals = sum(event.kind is EventKind.RECOVERY for event in events)
     return Repetition(count(events), recovery_goals, digest, track, wall_seconds() - started)
 

@@ -5,8 +5,20 @@ from types import SimpleNamespace
 import pytest
 from py_trees.common import Status
 
+from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.conditions import recovery_would_help
-from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
+from mbf_abstract.executives.recovering import (
+    InOrder,
+    MemRec,
+    OutcomeGuard,
+    PickByMotion,
+    PickByOutcome,
+    RecoveryNode,
+    RoundRobin,
+)
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.maps.tracking.blocking import Blockage
+from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 
 
@@ -210,3 +222,59 @@ def test_a_recovery_node_takes_a_closed_guard_for_a_failure(scripted, tick, task
 )
 def test_whether_a_recovery_would_help(fact, outcome, helps):
     assert recovery_would_help(outcome) is helps
+
+
+# ------------------------------------------------------------------------------------------------ pick by motion
+AHEAD = Path.from_poses([Pose.planar(0.0, 0.0), Pose.planar(9.0, 0.0)])
+
+
+def among(tree, *blockages, path=AHEAD, lost=False):
+    """Let the tree run in a mission whose map knows these objects on its path: (motion, metres ahead)."""
+
+    def what_blocks(of_path):
+        assert of_path is path
+        if lost:
+            raise RobotStateError("where am I?")
+        return tuple(Blockage(SimpleNamespace(motion=motion), 0, distance) for motion, distance in blockages)
+
+    navigator = SimpleNamespace(server=SimpleNamespace(queries=SimpleNamespace(what_blocks=what_blocks)))
+    mission = SimpleNamespace(navigator=navigator, path=path, path_to_follow=lambda: path)
+    for node in tree.iterate():
+        node.setup(mission=mission)
+    return tree
+
+
+@pytest.mark.parametrize(
+    ("blockages", "chosen"),
+    [
+        ([(Motion.MOVING, 1.0)], 0),
+        ([(Motion.WAITING, 2.9), (Motion.MOVING, 3.0)], 1),
+        ([], 2),
+        ([(Motion.MOVING, 3.1)], 2),
+    ],
+)
+def test_the_child_runs_that_fits_how_the_first_object_on_the_path_moves(scripted, tick, blockages, chosen):
+    children = [scripted("S"), scripted("S"), scripted("S")]
+    tree = PickByMotion("who?", {Motion.MOVING: children[0], Motion.WAITING: children[1]}, children[2])
+    assert tick(among(tree, *blockages)) == "S"
+    assert [child.ticks for child in children] == [int(number == chosen) for number in range(3)]
+
+
+def test_an_object_of_a_motion_without_a_child_is_left_to_whoever_plans(scripted, tick):
+    tree = PickByMotion("who?", {Motion.MOVING: scripted("S")}, nobody := scripted("S"))
+    assert tick(among(tree, (Motion.PARKED, 1.0))) == "F"
+    assert nobody.ticks == 0
+
+
+@pytest.mark.parametrize("unknown", [{"path": None}, {"lost": True}])
+def test_nobody_is_in_the_way_where_the_map_cannot_say_it(scripted, tick, unknown):
+    tree = PickByMotion("who?", {Motion.MOVING: scripted("F")}, scripted("S"))
+    assert tick(among(tree, (Motion.MOVING, 1.0), **unknown)) == "S"
+
+
+def test_what_was_tried_against_one_that_waits_is_remembered_while_others_pass(scripted, tick):
+    waits = RoundRobin("yield", [wait := scripted("S"), give_way := scripted("S")])
+    tree = PickByMotion("who?", {Motion.MOVING: scripted("S"), Motion.WAITING: waits}, scripted("S"))
+    for motion in (Motion.WAITING, Motion.MOVING, Motion.WAITING):
+        assert tick(among(tree, (motion, 1.0))) == "S"
+    assert (wait.ticks, give_way.ticks) == (1, 1)

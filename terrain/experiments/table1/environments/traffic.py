@@ -110,13 +110,24 @@ class Shuttle:
         self._yaw = float(self._headings[self._leg])
         self._velocity = 0.0
         self._dwell = 0.0
+        self._box = self._box_at(self._place)
+
+    @property
+    def _place(self) -> tuple[int, float, float]:
+        return self._leg, self._along, self._yaw
 
     @property
     def box(self) -> Box:
-        """Where it stands now."""
-        x, y = self.corners[self._leg].tolist()
-        heading = float(self._headings[self._leg])
-        return Box(x + self._along * math.cos(heading), y + self._along * math.sin(heading), self._yaw)
+        """Where it stands now; kept until it moves, as all others ask for it in every step."""
+        if self._place != self._box_place:
+            self._box = self._box_at(self._place)
+        return self._box
+
+    def _box_at(self, place: tuple[int, float, float]) -> Box:
+        self._box_place = leg, along, yaw = place
+        x, y = self.corners[leg].tolist()
+        heading = float(self._headings[leg])
+        return Box(x + along * math.cos(heading), y + along * math.sin(heading), yaw)
 
     @property
     def state(self) -> tuple[int, float, float, float]:

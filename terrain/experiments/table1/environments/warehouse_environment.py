@@ -17,7 +17,7 @@ from mbf_abstract.geometry import Pose, Twist
 from terrain.experiments.table1.conditions import Surroundings
 from terrain.experiments.table1.environments.traffic import CARRIER, TrafficRays, make_traffic
 from terrain.experiments.table1.environments.warehouse_world import WarehouseRobot, WarehouseWorld
-from terrain.experiments.table1.environments.world import Table1World
+from terrain.experiments.table1.environments.world import World
 from terrain.experiments.table1.plugin_wrappers import SOURCE, wrap_plugins
 from terrain.physics.simulation import Simulation
 from terrain.sensors.lidar import Lidar, LidarModel, planar_directions
@@ -39,16 +39,18 @@ class WarehouseEnvironment(SimulationSession):
 
     Parameters
     ----------
-    world : Table1World
+    world : World
     surroundings : Surroundings
     seed : int
         Of traffic, sensors, plugins and planner latencies.
+    navigation : Path
+        Configuration of the server; ``$WORLD_MAP`` in it becomes the map.
     """
 
     max_events = 1_000_000
     rates = LoopRates(period=0.05, ticks_per_sample=1)
 
-    def __init__(self, world: Table1World, surroundings: Surroundings, seed: int) -> None:
+    def __init__(self, world: World, surroundings: Surroundings, seed: int, navigation: Path = NAVIGATION) -> None:
         self._goals = world.goals()
         self._moves = False
         grid = world.grid()
@@ -67,7 +69,7 @@ class WarehouseEnvironment(SimulationSession):
         self._folder = tempfile.TemporaryDirectory(prefix="mbf_table1_")
         config_file = Path(self._folder.name) / "navigation.yaml"
         map_file = write_map(grid, config_file.parent, "world")
-        config_file.write_text(NAVIGATION.read_text().replace("$WORLD_MAP", map_file.name))
+        config_file.write_text(navigation.read_text().replace("$WORLD_MAP", map_file.name))
         simulation = Simulation(self.robot.world, self.robot, {"lidar": lidar})
         super().__init__(simulation, exact, config_file, SessionOptions(seed=seed))
         wrap_plugins(self.navigator.server, seed, surroundings.planner_latency)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Protocol
 
 from pydantic import model_validator
 
@@ -20,6 +21,24 @@ from terrain.worlds.floor_plan import read_floor_plan
 from terrain.worlds.occupancy import OccupancyGrid, read_occupancy
 
 WAREHOUSE = Path(__file__).with_name("warehouse.yaml")
+
+
+class World(Protocol):
+    """What an environment asks of a world: a floor, where our robot goes, and the routes of the others."""
+
+    @property
+    def start(self) -> tuple[float, float, float]:
+        """Where our robot starts: x, y [m], yaw [rad]."""
+
+    @property
+    def routes(self) -> tuple[tuple[tuple[float, float], ...], ...]:
+        """Closed routes of the others [m]."""
+
+    def grid(self) -> OccupancyGrid:
+        """Return the floor."""
+
+    def goals(self) -> list[Pose]:
+        """Return the waypoints as poses."""
 
 
 class Table1World(ParameterModel):
