@@ -48,6 +48,9 @@ def build(
     step_height: float = typer.Option(0.2, "--step-height", help="What is driven over, such as grass [m]."),
     hole_width: float = typer.Option(1.0, "--hole-width", help="Holes up to this width are filled [m]; 0 = none."),
     least_area: float = typer.Option(10.0, "--least-area", help="Smaller separate surfaces are left out [m2]."),
+    decimate: float = typer.Option(
+        0.0, "--decimate", help="Fewer vertices, whose faces stay this near to those of all [m]; 0 = all."
+    ),
     max_points: int = typer.Option(50_000_000, "--max-points", min=1, help="More points are refused unread."),
     drop_invalid: bool = typer.Option(False, "--drop-invalid", help="Leave out points that are not finite."),
     report: Path | None = typer.Option(None, "--report", help="Also write this HTML file: pictures and a test plan."),
@@ -65,7 +68,12 @@ def build(
         if up not in ("", "x", "y", "z"):
             raise typer.BadParameter(f"expected x, y or z, got {up!r}", param_hint="--up")
         parameters = SurfaceParameters(
-            cell=cell, clearance=clearance, step_height=step_height, hole_width=hole_width, least_area=least_area
+            cell=cell,
+            clearance=clearance,
+            step_height=step_height,
+            hole_width=hole_width,
+            least_area=least_area,
+            decimation_bound=decimate,
         )
         files = [*(inputs or ()), *from_run]
         with waiting("reading") as say:

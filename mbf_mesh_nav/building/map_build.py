@@ -16,6 +16,7 @@ import numpy as np
 from mbf_abstract.whole_files import replacing
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.building.clouds.point_cloud import MAX_POINTS, PointCloud, read_clouds
+from mbf_mesh_nav.building.decimation import DecimatedMesh, decimated
 from mbf_mesh_nav.building.map_facts import MapFacts, map_facts
 from mbf_mesh_nav.building.surface import BuiltSurface, SurfaceParameters, build_surface
 from mbf_mesh_nav.files.map_header import MapHeader, header_comments
@@ -70,12 +71,16 @@ def build_map(
         on_file=lambda file: on_step(f"reading {file.name}"),
     )
     surface = build_surface(cloud.points, parameters, on_step)
-    facts = map_facts(cloud, surface)
+    facts, mesh = map_facts(cloud, surface), DecimatedMesh(surface.vertices, surface.faces)
+    if parameters is not None and parameters.decimation_bound > 0.0:
+        on_step("decimation")
+        mesh = decimated(surface.vertices, surface.faces, parameters.decimation_bound)
+        facts = facts.of_decimated(mesh)
     on_step(f"writing {out.name}")
     write_map(
         out,
-        surface.vertices,
-        surface.faces,
+        mesh.vertices,
+        mesh.faces,
         MapHeader(cloud.origin, facts.error_rms, facts.error_95, facts.height_error, facts.crs),
     )
     return facts, surface, cloud

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
+from mbf_mesh_nav.building.decimation import DecimatedMesh
 from mbf_mesh_nav.building.surface import BuiltSurface
 
 
@@ -39,7 +41,11 @@ class MapFacts:
         Of the surface against its points, the noise of the points included; 95 % are closer than ``error_95``.
     height_error : float
         Standard error of a vertex, whose height is the mean of the points of a cell: their error over the square root
-        of their number.
+        of their number, less what smoothing takes off it; with what decimation adds.
+    faces_before : int
+        Before decimation.
+    decimation_max : float
+        Greatest distance that was measured between the decimated surface and the whole one; 0 = nothing was left out.
     """
 
     points: int
@@ -62,6 +68,18 @@ class MapFacts:
     error_95: float
     error_max: float
     height_error: float
+    faces_before: int
+    decimation_max: float = 0.0
+
+    def of_decimated(self, mesh: DecimatedMesh) -> MapFacts:
+        """Facts of the map with a decimated mesh."""
+        return replace(
+            self,
+            vertices=len(mesh.vertices),
+            faces=len(mesh.faces),
+            height_error=math.hypot(self.height_error, mesh.error_rms),
+            decimation_max=mesh.error_max,
+        )
 
 
 def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
@@ -95,7 +113,8 @@ def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
         error_rms=rms,
         error_95=float(np.percentile(distances, 95.0)) if len(distances) else 0.0,
         error_max=float(distances.max(initial=0.0)),
-        height_error=rms / max(points_of_cell, 1.0) ** 0.5,
+        height_error=surface.kept_error * rms / max(points_of_cell, 1.0) ** 0.5,
+        faces_before=len(surface.faces),
     )
 
 
@@ -104,12 +123,15 @@ def lines_of(facts: MapFacts) -> list[tuple[str, str]]:
     x, y, z = facts.size
     origin = ", ".join(f"{value:.10g}" for value in facts.origin)
     unit = "taken as metres" if facts.unit == 1.0 else f"a unit of {facts.unit:g} m"
+    mesh = f"{facts.vertices} vertices, {facts.faces} faces"
+    if facts.faces < facts.faces_before:
+        mesh += f" of {facts.faces_before}, {facts.decimation_max:.3f} m from the whole surface at most"
     thrown = f"{facts.outliers} isolated points, {facts.small_area:.0f} m2 of small surfaces"
     return [
         ("points", f"{facts.points}, {x:.1f} x {y:.1f} x {z:.1f} m, {unit}"),
         ("density", f"{facts.density:.0f} points/m2, a vertex every {facts.cell:g} m"),
         ("surface", f"{facts.area:.0f} m2, of which {facts.stacked_area:.0f} m2 are above others"),
-        ("mesh", f"{facts.vertices} vertices, {facts.faces} faces"),
+        ("mesh", mesh),
         ("holes", f"{facts.filled_area:.1f} m2 filled"),
         ("obstacles", f"{facts.obstacle_area:.1f} m2"),
         ("left out", thrown),

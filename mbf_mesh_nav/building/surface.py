@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,19 @@ from scipy.sparse.csgraph import connected_components
 from mbf_abstract.geometry.arithmetic import tan
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
+from mbf_mesh_nav.building.heights import (
+    HeightLimits,
+    fitted,
+    noise_of_points,
+    settled,
+    smoothed,
+    without_false_ground,
+)
 from mbf_mesh_nav.building.holes import without_holes
 from mbf_mesh_nav.building.outliers import isolated_points
 from mbf_mesh_nav.building.surface_patches import Grid, SurfacePatches
 from mbf_mesh_nav.kernels.building.columns import first_heights, sort_into_cells, split_columns
-from mbf_mesh_nav.kernels.building.patches import settle_patches, slopes_of_patches
-from mbf_mesh_nav.kernels.building.quads import distances_to_faces, faces_of_patches, fitted_heights
+from mbf_mesh_nav.kernels.building.quads import distances_to_faces, faces_of_patches
 from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges, unit_face_normals
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.mesh.topology import faces_of_vertices
@@ -26,15 +33,9 @@ from mbf_mesh_nav.mesh.topology import faces_of_vertices
 POINTS_PER_CELL = 4.0
 SMALLEST_CELL, LARGEST_CELL, CELL_STEP = 0.05, 1.0, 0.05
 STOREY = 2.5
-SETTLINGS = 2
-"""Times that slopes and heights are computed from each other."""
-FITTINGS, IMPROBABLE = 2, 2.0
-"""Times that heights are moved towards their points, and the standard errors from which a difference is no chance."""
 LEAST_POINTS = 100
 CROWN_UPWARD = 0.7071
 """Mean z of the unit normals below which a surface above ground is a crown."""
-MEDIAN_OF_ERRORS = 0.6745
-"""Median of the absolute values of normally distributed errors, in standard errors."""
 Step = Callable[[str], None]
 
 
@@ -66,6 +67,9 @@ class SurfaceParameters(ParameterModel):
     obstacle_points: int = parameter(2, "Points above a cell that make it an obstacle.", ge=1)
     hole_width: float = parameter(1.0, "Holes up to this width are filled; 0 = none.", unit="m", ge=0.0, le=20.0)
     least_area: float = parameter(10.0, "Smaller separate surfaces are left out.", unit="m2", ge=0.0)
+    decimation_bound: float = parameter(
+        0.0, "Fewer vertices, whose faces stay this near to those of all; 0 = all vertices.", unit="m", ge=0.0, le=1.0
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +91,8 @@ class BuiltSurface:
         Patches that something stands on, of surfaces that are too small, and those that became vertices.
     distances : (n,) float32
         Of points above (+) and below (-) the faces [m]; NaN for points of no face, such as those of trees.
+    kept_error : float
+        Share of the error of a cell's mean that its vertex keeps; 1 where nothing was smoothed.
     """
 
     vertices: FloatArray
@@ -98,6 +104,7 @@ class BuiltSurface:
     is_small: BoolArray
     is_used: BoolArray
     distances: Float32Array
+    kept_error: float
 
 
 def build_surface(
@@ -129,7 +136,11 @@ def build_surface(
     grid = Grid.around(kept, cell)
     rise = cell * float(tan(np.radians(chosen.max_slope))) + chosen.ground_thickness
     patches, kept = _split(kept, grid, chosen, rise)
-    patches = _fitted(_settled(patches, kept, chosen, rise), kept, chosen, rise)
+    limits = HeightLimits(0.0, chosen.ground_thickness, chosen.step_height, chosen.clearance, rise)
+    limits = limits.with_noise(noise_of_points(patches, kept, rise, rise))
+    patches = without_false_ground(settled(patches, kept, limits), limits, chosen.obstacle_points)
+    patches, kept_error = smoothed(patches, limits)
+    patches = fitted(patches, kept, limits)
     on_step("holes")
     patches = without_holes(patches, chosen.hole_width, rise, chosen.clearance)
     on_step("faces")
@@ -143,10 +154,10 @@ def build_surface(
     faces = faces[is_kept]
     on_step("error")
     arrays = (patches.firsts, patches.ends, patches.centres, patches.heights)
-    distances = distances_to_faces(kept, *arrays, links, is_used, cell, chosen.step_height)
+    distances = distances_to_faces(kept, *arrays, links, is_used, cell, limits.step)
     vertices, faces = _compact(np.column_stack([patches.centres, patches.heights]), faces)
     return BuiltSurface(
-        vertices, faces, patches, kept, is_outlier, is_obstacle, is_small & ~is_used, is_used, distances
+        vertices, faces, patches, kept, is_outlier, is_obstacle, is_small & ~is_used, is_used, distances, kept_error
     )
 
 
@@ -185,30 +196,6 @@ def _split(points: FloatArray, grid: Grid, chosen: SurfaceParameters, rise: floa
     bottoms, tops = ordered[firsts, 2], ordered[ends - 1, 2]
     standing = np.zeros(len(cells), dtype=np.int32)
     return SurfacePatches(grid, cells, kinds, firsts, ends, bottoms, tops, heights, standing), ordered
-
-
-def _settled(patches: SurfacePatches, points: FloatArray, chosen: SurfaceParameters, rise: float) -> SurfacePatches:
-    """Copy with heights along the slopes of the surface, and the points that stand on it counted."""
-    limits = np.array([chosen.ground_thickness, chosen.step_height, chosen.clearance])
-    for _ in range(SETTLINGS):
-        slopes = slopes_of_patches(patches.heights, patches.links(rise), patches.grid.cell)
-        arrays = (patches.firsts, patches.ends, patches.kinds, patches.centres, patches.heights)
-        heights, standing = settle_patches(points, *arrays, slopes, limits)
-        patches = replace(patches, heights=heights, standing=standing)
-    return patches
-
-
-def _fitted(patches: SurfacePatches, points: FloatArray, chosen: SurfaceParameters, rise: float) -> SurfacePatches:
-    """Copy whose faces are as near to the ground points as these are exact; see ``fitted_heights``."""
-    everywhere = np.ones(len(patches.cells), dtype=np.bool_)
-    for _ in range(FITTINGS):
-        links = patches.links(rise)
-        arrays = (points, patches.firsts, patches.ends, patches.centres, patches.heights, links)
-        distances = distances_to_faces(*arrays, everywhere, patches.grid.cell, chosen.ground_thickness)
-        error = float(np.nanmedian(np.abs(distances))) / MEDIAN_OF_ERRORS if np.isfinite(distances).any() else 0.0
-        limits = np.array([chosen.ground_thickness, IMPROBABLE * error])
-        patches = replace(patches, heights=fitted_heights(*arrays, patches.grid.cell, limits))
-    return patches
 
 
 def _is_large(patches: SurfacePatches, faces: IntArray, least_area: float) -> BoolArray:

@@ -329,5 +329,5 @@ def test_bumps_are_flattened_less_than_by_the_means_of_their_cells(rng, monkeypa
         return (true * heights).sum() / (true * true).sum()
 
     fitted = kept_share()
-    monkeypatch.setattr("mbf_mesh_nav.building.surface.FITTINGS", 0)
+    monkeypatch.setattr("mbf_mesh_nav.building.heights.FITTINGS", 0)
     assert fitted > kept_share() + 0.05

@@ -1,0 +1,155 @@
+"""Heights of surface patches: from their points, along the slopes around them, as smooth as the points' noise asks.
+
+A cell's mean has the noise of a point over the square root of their number. A scanner's 2 cm become 1 cm, and nothing
+more is needed. Scans from wrong poses have 6 cm and more: the bands of ground and of what stands on it have to be as
+wide, and heights are weighed against the smoothness that the ground itself shows.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.building.surface_patches import SurfacePatches
+from mbf_mesh_nav.kernels.building.patches import settle_patches, slopes_of_patches
+from mbf_mesh_nav.kernels.building.quads import distances_to_faces, fitted_heights
+from mbf_mesh_nav.kernels.building.smoothing import ACROSS, bends_of_patches, smoothed_heights, unsupported_patches
+
+SETTLINGS = 2
+"""Times that slopes and heights are computed from each other."""
+FITTINGS, IMPROBABLE = 2, 2.0
+"""Times that heights are moved towards their points, and the standard errors from which a difference is no chance."""
+MEDIAN_OF_ERRORS = 0.6745
+"""Median of the absolute values of normally distributed errors, in standard errors."""
+SCANNER = 0.03
+"""Noise [m] for which the limits of ``SurfaceParameters`` are made."""
+BAND, STANDING = 6.0, 5.0
+"""Where there is more, in standard errors: how thick ground may be, and above which height something stands on it."""
+UNSTEADY = 0.02
+"""Standard error [m] of a cell's mean from which heights are smoothed."""
+ROUNDS, FREQUENCIES = 30, 32
+BEND_SHARE = 0.362
+"""Variance of a bend of a surface of which all bends are weighed as in ``smoothed_heights``, in units of one bend's."""
+
+
+class HeightLimits(NamedTuple):
+    """What is ground and what stands on it.
+
+    Attributes
+    ----------
+    noise : float
+        Standard error of a point along z [m].
+    thickness : float
+        Points up to this height above the lowest of a cell are ground [m].
+    step : float
+        What stands up to this height is driven over [m].
+    clearance : float
+        Points higher than this are no obstacle [m].
+    rise : float
+        Greatest difference of the heights of linked patches [m].
+    """
+
+    noise: float
+    thickness: float
+    step: float
+    clearance: float
+    rise: float
+
+    def with_noise(self, noise: float) -> HeightLimits:
+        """Limits wide enough for points with a standard error [m]."""
+        if noise <= SCANNER:
+            return self._replace(noise=noise)
+        thickness, step = max(self.thickness, BAND * noise), max(self.step, STANDING * noise)
+        return self._replace(noise=noise, thickness=thickness, step=step)
+
+
+def noise_of_points(patches: SurfacePatches, points: FloatArray, within: float, rise: float) -> float:
+    """Standard error of the points [m] about the faces between the patches; 0 where there are no faces.
+
+    Parameters
+    ----------
+    within : float
+        Points farther from the faces [m] do not count.
+    """
+    everywhere = np.ones(len(patches.cells), dtype=np.bool_)
+    arrays = (points, patches.firsts, patches.ends, patches.centres, patches.heights, patches.links(rise))
+    distances = distances_to_faces(*arrays, everywhere, patches.grid.cell, within)
+    return float(np.nanmedian(np.abs(distances))) / MEDIAN_OF_ERRORS if np.isfinite(distances).any() else 0.0
+
+
+def settled(patches: SurfacePatches, points: FloatArray, limits: HeightLimits) -> SurfacePatches:
+    """Copy with heights along the slopes of the surface, and the points that stand on it counted."""
+    bands = np.array([limits.thickness, limits.step, limits.clearance])
+    for _ in range(SETTLINGS):
+        slopes = slopes_of_patches(patches.heights, patches.links(limits.rise), patches.grid.cell)
+        arrays = (patches.firsts, patches.ends, patches.kinds, patches.centres, patches.heights)
+        heights, standing = settle_patches(points, *arrays, slopes, bands)
+        patches = replace(patches, heights=heights, standing=standing)
+    return patches
+
+
+def smoothed(patches: SurfacePatches, limits: HeightLimits) -> tuple[SurfacePatches, float]:
+    """Copy with heights weighed against a smooth surface, and the share of a cell's error that its height keeps.
+
+    The ground's own bends are what the bends of the heights have beyond the noise. Maximum of the posterior
+    probability for independent normal errors and bends (Wahba, "Spline models for observational data", 1990, 1.5); its
+    variance is the mean, over all frequencies, of what the smoothing lets through.
+    """
+    counts = (patches.ends - patches.firsts).astype(np.int32)
+    usual = float(np.median(counts[patches.is_ground])) if patches.is_ground.any() else 1.0
+    if limits.noise <= UNSTEADY * np.sqrt(usual):
+        return patches, 1.0
+    links = patches.links(limits.rise)
+    bends, variances = bends_of_patches(patches.heights, counts, links)
+    if not len(bends):
+        return patches, 1.0
+    variance = limits.noise * limits.noise
+    excess = bends * bends - variance * variances
+    ground = max(float(excess.mean()), 0.01 * variance) / BEND_SHARE
+    stiffness = variance / ground
+    heights = smoothed_heights(patches.heights, counts, links, stiffness, ROUNDS)
+    return replace(patches, heights=heights), float(np.sqrt(_kept_variance(stiffness / usual)))
+
+
+def _kept_variance(stiffness: float) -> float:
+    """Mean of the share of noise that smoothing lets through, over all frequencies of a square grid."""
+    angles = [math.pi * (step + 0.5) / FREQUENCIES for step in range(2 * FREQUENCIES)]
+    cosine, sine = np.array([math.cos(angle) for angle in angles]), np.array([math.sin(angle) for angle in angles])
+    both, turned = cosine[:, None] * cosine, sine[:, None] * sine
+    cosines = (cosine[:, None], cosine, both - turned, both + turned)  # of x, y, x + y and x - y
+    along_x, along_y, *diagonal = (4.0 * (1.0 - one) * (1.0 - one) for one in cosines)
+    bend = along_x + along_y + ACROSS * (diagonal[0] + diagonal[1])
+    return float((1.0 / (1.0 + stiffness * bend)).mean())
+
+
+def fitted(patches: SurfacePatches, points: FloatArray, limits: HeightLimits) -> SurfacePatches:
+    """Copy whose faces are as near to the ground points as these are exact; see ``fitted_heights``."""
+    for _ in range(FITTINGS):
+        error = noise_of_points(patches, points, limits.thickness, limits.rise)
+        arrays = (points, patches.firsts, patches.ends, patches.centres, patches.heights, patches.links(limits.rise))
+        heights = fitted_heights(*arrays, patches.grid.cell, np.array([limits.thickness, IMPROBABLE * error]))
+        patches = replace(patches, heights=heights)
+    return patches
+
+
+def without_false_ground(patches: SurfacePatches, limits: HeightLimits, least: int) -> SurfacePatches:
+    """Copy in which lowest patches that no ground holds up are what stands there, or gone if they have few points.
+
+    Parameters
+    ----------
+    least : int
+        Points that make an obstacle.
+    """
+    standing = patches.standing.copy()
+    links, is_ground = patches.links(limits.rise), standing < least
+    while True:
+        found = unsupported_patches(patches.heights, patches.kinds, links, is_ground, limits.step)
+        if not found.any():
+            break
+        is_ground &= ~found
+        standing[found] = (patches.ends - patches.firsts)[found]
+    return replace(patches, standing=standing).without(~is_ground & (standing < least))
