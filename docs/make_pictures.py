@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import sys
 import tempfile
@@ -16,15 +17,24 @@ from terrain.recording.recording import Recording
 from terrain.scenarios.scenario import load_scenario
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.viewer.pictures.animation import write_animation
+from terrain.viewer.pictures.layer_picture import has_layers, layer_picture_png
 from terrain.viewer.results import write_results
 
 DOCS = Path(__file__).resolve().parent
 PICTURED, REPLAYED = ("outdoor", "indoor"), ("garage_roof",)
+COSTS = ("steepness", "roughness", "height_diff", "tilt")
 WIDTH = 900  # pixels
 
 
+def make_small(picture: Path | io.BytesIO, file: Path) -> None:
+    """Keep a picture in 128 colours and ``WIDTH`` pixels."""
+    image = Image.open(picture).convert("RGB")
+    image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
+    image.quantize(128).save(file, optimize=True)
+
+
 def make(name: str) -> None:
-    """Run a shipped scenario and keep its picture, small, and its animation, or its replay."""
+    """Run a shipped scenario and keep its picture, small, with its costs and animation, or its replay."""
     with tempfile.TemporaryDirectory() as folder:
         result = run_scenario(load_scenario(name), RunOptions(Path(folder), write_views=write_results))
         if not result.success:
@@ -32,10 +42,11 @@ def make(name: str) -> None:
         if name in REPLAYED:
             shutil.copy(Path(folder) / "replay.html", DOCS / "replays" / f"{name}.html")
         else:
-            image = Image.open(Path(folder) / "picture.png").convert("RGB")
-            image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
-            image.quantize(128).save(DOCS / "pictures" / f"{name}.png", optimize=True)
-            write_animation(DOCS / "pictures" / f"{name}.gif", Recording.load(Path(folder) / "recording.npz"))
+            make_small(Path(folder) / "picture.png", DOCS / "pictures" / f"{name}.png")
+            recording = Recording.load(Path(folder) / "recording.npz")
+            write_animation(DOCS / "pictures" / f"{name}.gif", recording)
+            if has_layers(recording):
+                make_small(io.BytesIO(layer_picture_png(recording, COSTS)), DOCS / "pictures" / f"{name}_costs.png")
 
 
 if __name__ == "__main__":

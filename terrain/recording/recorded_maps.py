@@ -8,7 +8,7 @@ half precision, because three digits are enough for a colour and infinity stays 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +89,37 @@ class RecordedMesh:
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
     costs: NDArray[np.float16]
+
+
+class RecordedLayer(NamedTuple):
+    """The costs of one layer of a mesh map, on the surface of the first ``RecordedMesh``.
+
+    Attributes
+    ----------
+    name : str
+    costs : (V,) float16
+        In the layer's own unit; inf is forbidden.
+    """
+
+    name: str
+    costs: NDArray[np.float16]
+
+
+def layer_arrays(layers: list[RecordedLayer]) -> dict[str, Any]:
+    """All layers as arrays for a file: names (n,), costs (n, V)."""
+    if not layers:
+        return {}
+    return {
+        "layer_names": np.array([layer.name for layer in layers]),
+        "layer_costs": np.array([one.costs for one in layers]),
+    }
+
+
+def layers_from(arrays: dict[str, Any]) -> list[RecordedLayer]:
+    """Read what ``layer_arrays`` made; older recordings may have none."""
+    if "layer_names" not in arrays:
+        return []
+    return [RecordedLayer(*one) for one in zip(arrays["layer_names"].tolist(), arrays["layer_costs"], strict=True)]
 
 
 def add_if_changed(meshes: list[RecordedMesh], time: float, view: MeshView) -> None:

@@ -21,7 +21,7 @@ from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.maps.view import GridView, MapView, MeshView
 from terrain.physics.protocols import Actor
 from terrain.recording.actor_track import ActorTrack
-from terrain.recording.recorded_maps import RecordedGrid, RecordedMesh, add_if_changed
+from terrain.recording.recorded_maps import RecordedGrid, RecordedLayer, RecordedMesh, add_if_changed, half_precision
 from terrain.recording.recorded_objects import RecordedObjects
 from terrain.recording.recording import Recording, RobotShape, StampedPoints
 from terrain.recording.verdict import UNFINISHED, Verdict
@@ -42,6 +42,7 @@ class Taken(NamedTuple):
     scans: int = 0
     grids: int = 0
     meshes: int = 0
+    layers: int = 0
     objects: int = 0
 
 
@@ -75,6 +76,7 @@ class Recorder:
     scan_origins: list[FloatArray] = field(default_factory=list)
     grids: list[RecordedGrid] = field(default_factory=list)
     meshes: list[RecordedMesh] = field(default_factory=list)
+    layers: list[RecordedLayer] = field(default_factory=list)
     objects: list[RecordedObjects] = field(default_factory=list)
     actors: Sequence[Actor] = ()
     map_budget: int = MAX_MAP_COSTS
@@ -100,8 +102,16 @@ class Recorder:
         self.scans.append((time, np.array(points, dtype=np.float64).reshape(-1, 3)))
         self.scan_origins.append(np.array(origin, dtype=np.float64).reshape(3))
 
-    def map(self, time: float, look: Callable[[], MapView | None]) -> None:
-        """Add what the map looks like now, unless it is too large or was looked at some seconds ago."""
+    def map(self, time: float, look: Callable[..., MapView | None], layers: Sequence[str] = ()) -> None:
+        """Add what the map looks like now, unless it is too large or was looked at some seconds ago.
+
+        Parameters
+        ----------
+        look : callable
+            Gives the map, or what has the name that it is called with.
+        layers : sequence of str
+            Names of a mesh's layers, which are added with the first look.
+        """
         if time < self._next_map or self.map_budget <= 0:
             return
         self._next_map = time + MAP_PERIOD
@@ -111,6 +121,16 @@ class Recorder:
             self.grids.append(RecordedGrid.of(time, view))
         elif isinstance(view, MeshView) and view.costs.size <= MAX_MESH_VERTICES:
             add_if_changed(self.meshes, time, view)
+            if not self.layers:
+                self._add_layers(look, layers)
+
+    def _add_layers(self, look: Callable[..., MapView | None], names: Sequence[str]) -> None:
+        """Add the costs of layers, as many as there is room for."""
+        for name in names:
+            view = look(name) if self.map_budget > 0 else None
+            if view is not None:
+                self.map_budget -= view.costs.size
+                self.layers.append(RecordedLayer(name, half_precision(view.costs)))
 
     def tracked(self, time: float, look: Callable[[], Iterable[TrackedObject]]) -> None:
         """Add the objects that the robot knows of now, in the map, unless that was looked at just before.
@@ -142,8 +162,8 @@ class Recorder:
         return self._recording(before, now, UNFINISHED, events, began), now
 
     def _all(self) -> Taken:
-        kept: tuple[Sized, ...] = (self._samples, self.paths, self.scan_origins, self.grids, self.meshes, self.objects)
-        return Taken(*map(len, kept))
+        kept: tuple[Sized, ...] = (self._samples, self.paths, self.scan_origins, self.grids, self.meshes, self.layers)
+        return Taken(*map(len, (*kept, self.objects)))
 
     def _recording(
         self, before: Taken, now: Taken, verdict: Verdict, events: Sequence[Event], began: float
@@ -176,6 +196,7 @@ class Recorder:
             verdict=verdict,
             grids=self.grids[before.grids : now.grids],
             meshes=meshes,
+            layers=self.layers[before.layers : now.layers],
             actors=self._actor_tracks(before.samples, now.samples),
             objects=self.objects[before.objects : now.objects],
         )

@@ -24,9 +24,12 @@ from terrain.physics.robot_models import Drive, RobotSpec
 from terrain.recording.actor_track import ActorTrack, track_arrays, tracks_from
 from terrain.recording.recorded_maps import (
     RecordedGrid,
+    RecordedLayer,
     RecordedMesh,
     grid_arrays,
     grids_from,
+    layer_arrays,
+    layers_from,
     mesh_arrays,
     meshes_from,
 )
@@ -112,6 +115,8 @@ class Recording:
         The map the plans were made on, where it is a grid; seldom enough that the file stays small.
     meshes : list of RecordedMesh
         The same where it is a mesh.
+    layers : list of RecordedLayer
+        What each layer of that mesh said when the first plan came.
     actors : list of ActorTrack
         What moved by itself.
     objects : list of RecordedObjects
@@ -136,6 +141,7 @@ class Recording:
     verdict: Verdict
     grids: list[RecordedGrid] = field(default_factory=list)
     meshes: list[RecordedMesh] = field(default_factory=list)
+    layers: list[RecordedLayer] = field(default_factory=list)
     actors: list[ActorTrack] = field(default_factory=list)
     objects: list[RecordedObjects] = field(default_factory=list)
     scan_origins: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
@@ -162,7 +168,7 @@ class Recording:
             arrays |= _stamped_arrays(name, getattr(self, name))
         arrays["scan_origins"] = self.scan_origins
         arrays |= grid_arrays(self.grids) | mesh_arrays(self.meshes) | track_arrays(self.actors)
-        arrays |= object_arrays(self.objects)
+        arrays |= object_arrays(self.objects) | layer_arrays(self.layers)
         metadata: dict[str, Any] = {
             "scenario": self.scenario,
             "backend": self.backend,
@@ -243,6 +249,7 @@ def _recording_from(arrays: dict[str, Any]) -> Recording:
         verdict=Verdict(**ending | {"failures": tuple(ending["failures"])}),
         grids=grids_from(arrays),
         meshes=meshes_from(arrays),
+        layers=layers_from(arrays),
         actors=tracks_from(arrays),
         objects=objects_from(arrays),
         scan_origins=arrays.get("scan_origins", np.zeros((0, 3))),

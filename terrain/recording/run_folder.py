@@ -135,6 +135,7 @@ def read_parts(folder: Path) -> Recording:
             events=tuple(_joined(parts, "events")),
             grids=_joined(parts, "grids"),
             meshes=_with_surface(_joined(parts, "meshes")),
+            layers=_joined(parts, "layers"),
             actors=[
                 replace(track, poses=np.concatenate([part.actors[number].poses for part in parts]))
                 for number, track in enumerate(parts[0].actors)

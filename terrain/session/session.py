@@ -221,7 +221,8 @@ class Session(SimulationSession):
         path = handle.result.path if handle.result is not None else None
         if path is not None:
             self.recorder.path(self.simulation.time, path.positions)
-            self.recorder.map(self.simulation.time, self.navigator.server.map_view)
+            server = self.navigator.server
+            self.recorder.map(self.simulation.time, server.map_view, server.map_views)
 
 
 def write_navigation_config(

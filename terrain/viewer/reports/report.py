@@ -19,11 +19,17 @@ from mbf_abstract.geometry import FloatArray
 from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.recording.metrics import cross_track_errors
 from terrain.recording.recording import Recording
+from terrain.viewer.pictures.layer_picture import has_layers, layer_picture_png
 from terrain.viewer.pictures.picture import ViewerMissing
 from terrain.viewer.pictures.run_picture import picture_png
 from terrain.viewer.reports.event_lines import NOTABLE, event_text
 from terrain.viewer.reports.page import page, table
 from terrain.viewer.reports.timeline import timeline_svg
+
+LAYERS_TEXT = (
+    "As the map was when the first plan came: from pale green for 0 to dark red for the end of the layer's own scale, "
+    "grey for what it forbids. The line is the last plan."
+)
 
 
 def report_html(recording: Recording, metrics: Mapping[str, Any]) -> str:
@@ -31,6 +37,7 @@ def report_html(recording: Recording, metrics: Mapping[str, Any]) -> str:
     parts = [
         summary(recording),
         picture(recording),
+        layers(recording),
         "<h2>Over time</h2>" + plots_svg(recording) if len(recording.times) else "",
         f"<h2>Actions and plugins</h2>{timeline_svg(recording.events)}",
         "<h2>Metrics</h2>" + table(("name", "value"), metrics.items()),
@@ -58,6 +65,15 @@ def picture(recording: Recording) -> str:
     """The run from above."""
     data = base64.b64encode(picture_png(recording)).decode("ascii")
     return f'<img alt="map, plan and driven track from above" src="data:image/png;base64,{data}">'
+
+
+def layers(recording: Recording) -> str:
+    """What each layer of a mesh map said; nothing where that was not recorded."""
+    if not has_layers(recording):
+        return ""
+    data = base64.b64encode(layer_picture_png(recording)).decode("ascii")
+    image = f'<img alt="costs of each layer from above" src="data:image/png;base64,{data}">'
+    return f"<h2>Costs by layer</h2><p>{LAYERS_TEXT}</p>{image}"
 
 
 def goals_table(recording: Recording) -> str:
