@@ -4,9 +4,10 @@
     python docs/generate_reference.py --check    write nothing; exit code 1 and the names of pages that are out of date
 
 Written are ``configuration.md`` (every parameter of every model), ``scenario_reference.md`` (every key of a scenario),
-the example plugins (what ``mbf new`` writes), the listings in the guides (the text of the example files), the table of
-metrics in ``verdict.md``, that of a robot's keys in ``your_robot.md``, tables of parameter models that a page names,
-and the table of ``faults_and_promises.md`` (the docstrings of ``tests/faults``).
+``commands.md`` (every command of ``mbf``), the example plugins (what ``mbf new`` writes), the listings in the guides
+(the text of the example files), the table of metrics in ``verdict.md``, that of a robot's keys in ``your_robot.md``,
+tables of parameter models that a page names, and the table of ``faults_and_promises.md`` (the docstrings of
+``tests/faults``).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import re
 import sys
 from pathlib import Path
 
+from command_tables import commands_page
 from parameter_tables import configuration_page, parameter_table
 from scenario_tables import scenario_page
 
@@ -51,7 +53,11 @@ FAULT_ROW = re.compile(r"Fault table, rows? (?P<rows>[\d, and]+)[^:]*: (?P<text>
 
 def generate() -> dict[Path, str]:
     """Return every generated file with the text it should have."""
-    texts = {DOCS / "configuration.md": configuration_page(), DOCS / "scenario_reference.md": scenario_page()}
+    texts = {
+        DOCS / "configuration.md": configuration_page(),
+        DOCS / "scenario_reference.md": scenario_page(),
+        DOCS / "commands.md": commands_page(),
+    }
     for name, (kind, map_name) in EXAMPLES.items():
         texts[REPOSITORY / "examples" / "plugins" / f"{name}.py"] = plugin_source(kind, name, map_name)
     for page in sorted(DOCS.glob("*.md")):
