@@ -1,11 +1,13 @@
 """The outdoor evaluation on ground that nothing was chosen on, with replays of failures and a picture of difficulty.
 
     python benchmarks/outdoor_evaluation.py [--quick] [--json] [--workers 2] [--data ../shared/data]
-        [--fresh 3] [--first-seed 5000] [--entries any_angle,cvp] [--results DIR] [--replays DIR] [--report DIR]
+        [--fresh 3] [--first-seed 5000] [--entries any_angle,cvp] [--fallback heading_astar]
+        [--results DIR] [--replays DIR] [--report DIR]
 
 ``mbf bench outdoor`` is the evaluation itself; this adds the straight line, ``--fresh`` seeds and surveys, of which
-three belong to no other evaluation, and for each entry and class of failure a replay. Finished runs stand in the folder
-of results and are never run again. What has been looked at is not fresh any more: take a later ``--first-seed``.
+three belong to no other evaluation, ``--fallback`` as in the shipped configurations, and for each entry and class of
+failure a replay. Finished runs stand in the folder of results and are never run again. What has been looked at is not
+fresh any more: take a later ``--first-seed``.
 """
 
 from __future__ import annotations
@@ -52,6 +54,13 @@ def fresh(data: Path, first_seed: int, seeds: int) -> Protocol:
         trials += [Trial(generated(level), seed) for level in range(LEVELS)]
         trials += [Trial(real(file, seed, scales[file.name]), seed) for file in files]
     return replace(outdoor([0]), name="outdoor fresh", trials=trials)
+
+
+def with_fallback(entry: Entry, planner: str) -> Entry:
+    """The entry with a planner to ask where its own finds no path; entries without a mesh have none."""
+    if entry.backend != "mesh" or entry is STRAIGHT:
+        return entry
+    return replace(entry, settings=dict(entry.settings) | {"fallback_planner": planner})
 
 
 def keep_replays(protocol: Protocol, entries: list[Entry], rows: list[Row], folder: Path) -> None:
@@ -118,6 +127,7 @@ def main() -> None:
     parser.add_argument("--fresh", type=int, default=3, help="seeds of every level and survey")
     parser.add_argument("--first-seed", type=int, default=5000, help="parameters were chosen on seeds from 1000")
     parser.add_argument("--entries", default="", help="comma separated; all and the straight line if not given")
+    parser.add_argument("--fallback", default="", help="planner that the entries on the mesh fall back to")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     parser.add_argument("--results", type=Path, help="folder of finished runs, added to")
     parser.add_argument("--replays", type=Path, help="folder for one replay of each class of failure")
@@ -126,6 +136,8 @@ def main() -> None:
     protocol = outdoor([0]) if arguments.quick else fresh(arguments.data, arguments.first_seed, arguments.fresh)
     known = {**protocol.entries, STRAIGHT.name: STRAIGHT}
     entries = [known[name] for name in (arguments.entries.split(",") if arguments.entries else known)]
+    if arguments.fallback:
+        entries = [with_fallback(entry, arguments.fallback) for entry in entries]
     with tempfile.TemporaryDirectory() as folder:
         rows = run_trials(protocol, entries, arguments.results or Path(folder), arguments.workers, TIME_LIMIT)
     lines = standings(rows, len(protocol.trials))
