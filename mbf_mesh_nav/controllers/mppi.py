@@ -234,6 +234,8 @@ class MPPIController(MeshController):
         stands = travel < _STANDSTILL and turn < _STANDSTILL
         if stands and not self._hindered_by:  # motions into somebody collide with the ground marked below them
             self._hindered_by = around.hindering(met, np.where(met.touches, scores, np.inf))
+        if stands and not self._hindered_by and collided.mean() > 0.5:  # so do those that end before they meet
+            self._hindered_by = around.nearest(self.parameters.max_vel_x * len(blended) * self.parameters.model_dt)
         stands = stands and not self._hindered_by
         has_far_to_go = self._distance_to_goal(pose) > _STANDSTILL + self.parameters.goal_distance
         self._idle_cycles = self._idle_cycles + 1 if stands and has_far_to_go else 0

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
+from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.tracking.contact import in_the_way, moving_on_storey
 from mbf_abstract.maps.tracking.kernels.meeting import NOBODY, OBJECT_COLUMNS, meet
@@ -127,6 +128,11 @@ class MovingAround:
         stride = max(1, round(LOOK / step_time))
         costs, touched = meet(poses, self.yaw, step_time, stride, self.box, self.objects, p.horizon, p.margin)
         return Encounters(np.float32(p.weight) * costs, touched)
+
+    def nearest(self, within: float) -> str:
+        """Whom a robot that cannot get on waits for: the nearest, if nearer than ``within`` [m]; empty if nobody."""
+        gaps = norm(self.objects[:, :2]) - self.objects[:, 4]
+        return in_the_way(self.moving[int(np.argmin(gaps))]) if len(gaps) and gaps.min() < within else ""
 
     def hindering(self, met: Encounters, costs: FloatArray | Float32Array) -> str:
         """Whom the robot would drive into if it did not look ahead; empty if nobody.

@@ -1,7 +1,8 @@
 """A tracker of moving objects in the points that a sensor sees.
 
 Clusters of points are assigned to the objects that are known, the nearest pairs first, and correct a Kalman filter of
-constant velocity for each. What is seen for the first time begins an object, what is not seen any more is forgotten.
+constant velocity for each. One that is off its expected place to the same side twice has turned: its filter learns the
+new velocity at once. What is seen for the first time begins an object, what is not seen any more is forgotten.
 
 When to use: people and robots among walls that a static map knows; take the points of that map out first, or what is
 seen of a wall through a gap passes for something that moves. When not: crowds so dense that their clusters merge, and
@@ -50,6 +51,13 @@ class TrackingParameters(ParameterModel):
     )
     acceleration_deviation: float = parameter(
         1.5, "Standard deviation of the acceleration of objects.", unit="m/s^2", gt=0.0, le=50.0
+    )
+    turning_deviation: float = parameter(
+        0.5,
+        "Standard deviation of the change of an object's velocity where it turns; 0 = turns are noticed late.",
+        unit="m/s",
+        ge=0.0,
+        le=10.0,
     )
     confirming_scans: int = parameter(3, "An object counts once it was seen in so many scans.", ge=1, le=100)
     forget_time: float = parameter(1.0, "An object that is unseen for longer is forgotten.", unit="s", gt=0.0, le=60.0)
@@ -113,7 +121,8 @@ class Tracker:
         seconds = self._advance(stamp)
         states = self._room[: self._count]
         owners = states_of.assign(states, boxes, sensor, p.max_size, p.association_distance)
-        states_of.correct(states, boxes, owners, sensor, stamp, p.position_deviation, SHRINKING * seconds)
+        deviations = np.array([p.position_deviation, p.turning_deviation])
+        states_of.correct(states, boxes, owners, sensor, stamp, seconds, deviations, SHRINKING * seconds)
         states_of.note_motion(states, stamp, p.moving_distance)
         known = (owners >= 0) & self._confirmed()[owners]
         found[::stride] = np.where(known, self._numbers[owners], NO_OBJECT)[labels]

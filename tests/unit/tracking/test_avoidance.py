@@ -185,3 +185,10 @@ def test_what_makes_no_sense_is_refused(name, value):
 
 def replace_limits(**changes):
     return AvoidanceParameters(**{**LIMITS.model_dump(), **changes})
+
+
+def test_a_robot_that_cannot_get_on_waits_for_the_nearest_who_moves():
+    far, near = person(2.0, 0.0, 0.0, 0.5), replace(person(0.0, -1.2, 0.5, 0.0), number=7)
+    around = MovingAround.on(Seeing(DISC, far, near), HERE, 0.0, LIMITS)
+    assert around.nearest(1.5) == "object 7 moves in the way, at (0.00, -1.20)"
+    assert around.nearest(0.5) == "" == MovingAround.on(Seeing(DISC), HERE, 0.0, LIMITS).nearest(1.5)

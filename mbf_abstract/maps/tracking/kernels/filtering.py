@@ -26,12 +26,16 @@ from mbf_abstract.maps.tracking.kernels.compiled import kernel
 FloatArray = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-STATE_COLUMNS = 18
+STATE_COLUMNS = 20
 X, Y, Z, VX, VY, VAR_POSITION, COVARIANCE, VAR_VELOCITY, HALF_X, HALF_Y = range(10)
-FIRST_SEEN, LAST_SEEN, SCANS, ANCHOR_X, ANCHOR_Y, ANCHOR_TIME, HAS_MOVED, CLEARED = range(10, STATE_COLUMNS)
+FIRST_SEEN, LAST_SEEN, SCANS, ANCHOR_X, ANCHOR_Y, ANCHOR_TIME, HAS_MOVED, CLEARED, OFF_X, OFF_Y = range(
+    10, STATE_COLUMNS
+)
 """Columns of the state of an object. It stood at its anchor at ``ANCHOR_TIME`` [s]; ``HAS_MOVED`` is 0 or 1, and so is
-``CLEARED``: whether it was cleared and not seen since."""
+``CLEARED``: whether it was cleared and not seen since. In its last scan it was ``OFF`` [m] where it was expected."""
 NOBODY = -1
+TURNED = 0.5
+"""An object has turned if it is off to the same side in two scans, by this many standard deviations on the average."""
 
 
 @kernel
@@ -118,10 +122,11 @@ def correct(
     owners: Indices,
     sensor: FloatArray,
     stamp: float,
-    position_deviation: float,
+    seconds: float,
+    deviations: FloatArray,
     shrink: float,
 ) -> None:
-    """Correct the objects by their clusters.
+    """Correct the objects by their clusters, those that have turned with more weight on what is seen.
 
     Parameters
     ----------
@@ -129,12 +134,14 @@ def correct(
         As in ``assign``, and its result.
     stamp : float
         Of the scan [s].
-    position_deviation : float
-        Of the middle of a cluster [m].
+    seconds : float
+        Time since the last scan [s].
+    deviations : (2,) float64
+        Of the middle of a cluster [m], and of the change of a velocity where an object turns [m/s].
     shrink : float
         How far [m] the remembered half size of an object may fall to what is seen.
     """
-    noise = position_deviation * position_deviation
+    noise = deviations[0] * deviations[0]
     for j in range(len(boxes)):
         if owners[j] == NOBODY:
             continue
@@ -143,6 +150,7 @@ def correct(
         _take_size(state, Y, HALF_Y, ANCHOR_Y, box[LEAST_Y], box[GREATEST_Y], sensor[1], shrink)
         dx = middle_of(box[LEAST_X], box[GREATEST_X], state[HALF_X], sensor[0]) - state[X]
         dy = middle_of(box[LEAST_Y], box[GREATEST_Y], state[HALF_Y], sensor[1]) - state[Y]
+        _notice_turn(state, dx, dy, noise, seconds, deviations[1])
         total = state[VAR_POSITION] + noise
         gain, velocity_gain = state[VAR_POSITION] / total, state[COVARIANCE] / total
         state[X] += gain * dx
@@ -156,6 +164,24 @@ def correct(
         state[LAST_SEEN] = stamp
         state[SCANS] += 1.0
         state[CLEARED] = 0.0
+
+
+@kernel
+def _notice_turn(
+    state: FloatArray, dx: float, dy: float, noise: float, seconds: float, turning_deviation: float
+) -> None:
+    """Trust the velocity less where an object is off (dx, dy) [m] its place to the same side as in the scan before.
+
+    What a filter that knows the motion is off by is independent from scan to scan (Bar-Shalom, Li, Kirubarajan 2001,
+    section 5.4.2); a turn, which it does not know, shows in both. It is taken to have been at the last scan.
+    """
+    together = dx * state[OFF_X] + dy * state[OFF_Y]
+    if together > TURNED * TURNED * (state[VAR_POSITION] + noise):
+        q = turning_deviation * turning_deviation
+        state[VAR_POSITION] += seconds * seconds * q
+        state[COVARIANCE] += seconds * q
+        state[VAR_VELOCITY] += q
+    state[OFF_X], state[OFF_Y] = dx, dy
 
 
 @kernel
