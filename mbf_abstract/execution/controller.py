@@ -186,13 +186,17 @@ class ControllerExecution:
 
     def _map_problem(self) -> str:
         """Why the map must not be driven on: also where its hook raises."""
+        problem: object = self._ask_map("map_problem", self._runtime.map_hooks.map_problem, failed=str)
+        return str(problem) if problem else ""
+
+    def _ask_map(self, name: str, hook: Callable[[], T], failed: Callable[[str], T]) -> T:
+        """Call a hook of the map; where it raises, ``failed`` makes an answer of the reason."""
         try:
-            problem: object = self._run.call_beside("the map's map_problem()", self._runtime.map_hooks.map_problem)
+            return self._run.call_beside(f"the map's {name}()", hook)
         except Abandoned:
             raise
         except Exception as error:
-            return f"map_problem raised {type(error).__name__}: {error_text(error)}"
-        return str(problem) if problem else ""
+            return failed(f"{name} raised {type(error).__name__}: {error_text(error)}")
 
     def _hold(self, lease: Lease, outcome: int, reason: str) -> ControllerEnd | None:
         """Stop the robot, which must not be driven on old data; the end once patience is over."""
@@ -249,13 +253,7 @@ class ControllerExecution:
     def _avoid_contact(self, pose: Pose, velocity: Twist, result: ControlResult) -> ControlResult:
         """Let the map slow the command down where the robot would touch something that moves."""
         hook = partial(self._runtime.map_hooks.avoid_contact, pose, velocity, result)
-        try:
-            return self._run.call_beside("the map's avoid_contact()", hook)
-        except Abandoned:
-            raise
-        except Exception as error:
-            text = f"avoid_contact raised {type(error).__name__}: {error_text(error)}"
-            return ControlResult(ExePathOutcome.MAP_ERROR, text)
+        return self._ask_map("avoid_contact", hook, failed=partial(ControlResult, ExePathOutcome.MAP_ERROR))
 
     # ------------------------------------------------------------------------------- judging a command
     def _judge(self, result: ControlResult, lease: Lease) -> ControllerEnd | None:

@@ -37,7 +37,7 @@ BESIDE = 3.0
 CURVES = (1.0, 0.3)
 """Radii of the curves of a robot that turns on the spot, in circumscribed radii."""
 FROM_START_TO_GOAL = 5
-"""A search all the way may make so many times the states of one of a piece."""
+"""A search of the whole path may make so many times the states of a search of one piece."""
 MARGINS = (0.5, 0.0)
 """How much larger the outline is taken, in cells."""
 BETWEEN = 3

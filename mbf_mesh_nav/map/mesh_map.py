@@ -13,59 +13,39 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.maps.navigation_map import PlaceCheck
-from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
-from mbf_mesh_nav.arrays import FloatArray, IntArray
+from mbf_abstract.geometry import Pose
+from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
-from mbf_mesh_nav.map.places import MeshPlaces
-from mbf_mesh_nav.map.robot_outline import OutlinedMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot, SnapshotSeries
+from mbf_mesh_nav.map.snapshot_answers import SnapshotAnswers
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
+from mbf_mesh_nav.mesh.locate import SurfaceLocator
 from mbf_mesh_nav.mesh.mesh_report import MeshReport
-from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE, UNKNOWN_RADIUS, forbidden_ahead, nearest_of
 from mbf_mesh_nav.mesh.repair import checked_mesh
 from mbf_mesh_nav.mesh.topology import MeshTopology, build_topology
-from mbf_mesh_nav.mesh.turning import pivots, slope_at, swept_obstacle
 
 if TYPE_CHECKING:
     import networkx
 
-FORBIDDEN_COST = 1.0
-"""Ground whose cost reaches this is not driven onto in a recovery."""
 REMEMBERED_CHANGES = 100
 """Number of changes of the default layer a planner may have missed and still repair its last result."""
 
 
-class MeshMap(OutlinedMap):
+class MeshMap(SnapshotAnswers):
     """A triangle mesh with layers. Construct it with ``from_arrays``, ``from_heights`` or ``map_builder``.
 
     Attributes
     ----------
-    topology : MeshTopology
-        All arrays in one value; each of them is an attribute of the map, too.
-    locator : SurfaceLocator
-        Nearest-point and ray queries.
     layers : LayerGraph
         The layers by name: ``mesh_map.layers["inflation"].costs``.
     report : MeshReport
         What was found in, and done to, the mesh when it was loaded.
     frame_id : str
         Frame of all coordinates.
-    inscribed_radius : float
-        Radius [m] of the disc that stands for the robot when the server is asked where it fits.
-    footprint : tuple of (x, y)
-        Corners [m] of the robot's outline, for turns on the spot and for contacts with moving objects; empty = that
-        disc.
-    max_turning_slope : float
-        Steeper ground [rad] is not turned on in a recovery.
     """
 
     layers: LayerGraph
-    inscribed_radius: float = 0.0
-    max_turning_slope: float = 0.35
 
     def __init__(
         self,
@@ -157,14 +137,6 @@ class MeshMap(OutlinedMap):
         return cls.from_arrays(*heightfield_mesh(heights, dx, dy, x0, y0, keep_grid=True), frame_id, repair)
 
     # ------------------------------------------------------------------------------------------------- queries
-    def locate(self, points: ArrayLike, max_distance: float = np.inf) -> Location:
-        """Nearest surface points of many points, see ``SurfaceLocator.locate``."""
-        return self.locator.locate(points, max_distance)
-
-    def locate_one(self, point: ArrayLike, max_distance: float = np.inf, hint_face: int = -1) -> SurfacePoint | None:
-        """Nearest surface point of one point or None, see ``SurfaceLocator.locate_one``."""
-        return self.locator.locate_one(point, max_distance, hint_face)
-
     def snapshot(self) -> MeshSnapshot:
         """Return the current state; cheap, call it once per plan or control cycle."""
         return self._snapshot
@@ -271,65 +243,11 @@ class MeshMap(OutlinedMap):
             return [layer.name for layer in self.layers.chosen(layer_names)]
         return [name for name, layer in self.layers.items() if type(layer).clear is not MeshLayer.clear]
 
-    # -------------------------------------------------------------------------------------------------- places
-    def places(self) -> MeshPlaces:
-        """What can be asked of places, on the map as it is now."""
-        return MeshPlaces(self.topology, self.locator, self.snapshot(), self.inscribed_radius)
-
-    def point_check(self) -> PlaceCheck:
-        """State and interpolated cost of the surface at points."""
-        return self.places().check_point
-
-    def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
-        """State and summed cost below the robot's disc."""
-        places = self.places()
-        return places.check_point if center_only else lambda pose: places.check_pose(pose, query)
-
-    def find_valid_pose(
-        self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
-    ) -> PoseAnswer:
-        """Nearest pose where the disc fits; a disc has no heading, so the angle does not matter."""
-        return self.places().find_valid_pose(pose, dist_tolerance, query)
-
     def take_parameters(self, parameters: Any) -> None:
         """Take over ``edge_cost_factor``, ``inscribed_radius`` and ``footprint`` of ``MeshMapParameters``."""
         if parameters.edge_cost_factor != self.edge_cost_factor:
             self.set_edge_cost_factor(parameters.edge_cost_factor)
         self.inscribed_radius, self.footprint = parameters.inscribed_radius, parameters.footprint
-
-    # -------------------------------------------------------------------------------------------------- motion
-    def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
-        """Where the robot would come onto forbidden ground or past a border, or that it is too steep to turn.
-
-        A motion that turns about a place within the robot's outline is a turn on the spot, even if it creeps.
-        """
-        place = self.locate_one(pose.position, SURFACE_DISTANCE)
-        if place is None:
-            return f"the robot is more than {SURFACE_DISTANCE:g} m from the surface"
-        turns = pivots(command, self.robot_reach)
-        if turns and (slope := slope_at(self.topology, place)) > self.max_turning_slope:
-            return f"the ground slopes {slope:.2f} rad, turning is allowed up to {self.max_turning_slope:g} rad"
-        ranks = self.snapshot().traversability_rank(FORBIDDEN_COST)
-        if turns and self.footprint:
-            swept = swept_obstacle(self.topology, ranks, place, pose, command, duration, self.footprint)
-            if swept:
-                return swept
-        radius = self.inscribed_radius or UNKNOWN_RADIUS
-        return forbidden_ahead(self.topology, ranks, place, pose, command, duration, radius)
-
-    def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
-        """Offset [m] to the nearest lethal vertex of the robot's storey; None if none is ``within`` [m]."""
-        place = self.locate_one(pose.position, SURFACE_DISTANCE)
-        if place is None:
-            return None
-        snapshot = self.snapshot()
-        lethal = np.asarray(snapshot.lethal | np.isposinf(snapshot.costs))
-        return nearest_of(self.topology, place, pose, within, lethal)
-
-    def heights_below(self, points: FloatArray) -> FloatArray:
-        """Height (n,) [m] of the first surface straight below each point (n, 3) [m], nan where there is none."""
-        _, distances = self.locator.cast_rays(points, (0.0, 0.0, -1.0))
-        return np.where(np.isfinite(distances), points[:, 2] - distances, np.nan)
 
     def stale_reason(self, now: float) -> str:
         """Why the map is not current at ``now`` [s]: a layer that raised, or a silent sensor; empty if it is."""

@@ -101,7 +101,7 @@ class HeadingSearch:
     def costs_to_states(
         self, query: LegQuery, limits: HeadingLimits, costs: PricedHeadings, start: StartStates
     ) -> Float32Array | None:
-        """Cost (V, 16) [m] of the way to each state, inf without one; None if cancelled.
+        """Cost (V, 16) [m] of the path to each state, inf without one; None if cancelled.
 
         Moves of which nothing is known count as drivable.
         """

@@ -114,10 +114,10 @@ class Episode:
         return self.session.loop.true_pose
 
     def drive(self, command: Twist) -> float:
-        """Send a command and let a step's time pass; return by how much the way left has become shorter [m].
+        """Send a command and let a step's time pass; return by how much the distance left has become shorter [m].
 
-        The way left is the rest of the plan and the distance from it; it also changes with the plan, so that the sum
-        over an episode with one goal is the first way less the last one. What the simulation raises is raised here.
+        The distance left is the rest of the plan and the distance from it; it also changes with the plan, so that the sum
+        over an episode with one goal is the first distance less the last one. What the simulation raises is raised here.
         """
         session = self.session
         if self._replan_at <= session.clock.now() + TIME_TOLERANCE:  # as in a run: the next command is on the new plan
@@ -165,7 +165,7 @@ class Episode:
             self._way = PathTracker(self._observer.tracker.path, self._observer.dimensions)
 
     def _planned(self, goal: Pose) -> Path | None:
-        """What the planner and, if the configuration names one, the refiner make of the way to a goal."""
+        """What the planner and, if the configuration names one, the refiner make of the path to a goal."""
         navigator = self.session.navigator
         path = navigator.get_path(goal).path
         if path is None or not len(path):

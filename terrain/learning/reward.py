@@ -10,7 +10,7 @@ from mbf_abstract.parameters import ParameterModel, parameter
 class RewardWeights(ParameterModel):
     """What each part is worth; penalties are positive numbers that are subtracted."""
 
-    progress: float = parameter(1.0, "Of each metre by which the way left becomes shorter.", unit="1/m", ge=0.0)
+    progress: float = parameter(1.0, "Of each metre by which the distance left becomes shorter.", unit="1/m", ge=0.0)
     arrival: float = parameter(10.0, "Of the last goal, once.", ge=0.0)
     contact: float = parameter(10.0, "Penalty for a contact or another end that is a failure, once.", ge=0.0)
     tilt: float = parameter(0.0, "Penalty for a tilt of 1 rad over a second.", unit="1/(rad s)", ge=0.0)
@@ -25,7 +25,7 @@ class StepFacts:
     Attributes
     ----------
     gained : float
-        By how much the way left has become shorter [m].
+        By how much the distance left has become shorter [m].
     arrived, failed : bool
         At the last goal; or ended by the judge otherwise.
     tilt : float

@@ -1,6 +1,6 @@
 """Whether the robot that a configuration describes is as large as the one that a scenario simulates.
 
-A configuration that is made for a smaller robot plans ways that its robot does not fit through.
+A configuration that is made for a smaller robot plans paths that its robot does not fit through.
 """
 
 from __future__ import annotations

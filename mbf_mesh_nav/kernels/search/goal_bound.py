@@ -1,4 +1,4 @@
-"""What a search over (vertex, heading) still has to pay, from below: the way to the goal without its turns.
+"""What a search over (vertex, heading) still has to pay, from below: the path to the goal without its turns.
 
 A wave from the goal over moves taken backwards, each at what driving it costs with its roll, ends a little beyond the
 start. Where it has settled, its distance is the bound. Where it has not, the triangle through the start is: a vertex
@@ -45,7 +45,7 @@ class GoalBound(NamedTuple):
     Attributes
     ----------
     distances : (V,) float32
-        Costs [m] of the way from a vertex to the goal, turns left out, where the wave has settled.
+        Costs [m] of the path from a vertex to the goal, turns left out, where the wave has settled.
     settled_below : float
         The wave has settled where the distance and the straight line to ``start`` sum up to less than this [m].
     vertices : (V, 3) float64

@@ -25,7 +25,7 @@ from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
 from mbf_mesh_nav.tiles.serving.parts import on_part
 
 PIECE = 128.0
-"""Length of a piece, in distances between vertices; what bends over a longer way is straightened in part."""
+"""Length of a piece, in distances between vertices; longer bends are straightened in part."""
 KEPT = 0.5
 """Share of a refined piece that is not refined again."""
 MARGIN = 8.0

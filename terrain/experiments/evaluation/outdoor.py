@@ -137,7 +137,7 @@ def outdoor(seeds: Sequence[int], levels: Sequence[int] = range(LEVELS), surveys
 
 
 def has_route(scenario: Scenario, seed: int) -> bool:
-    """Whether a way within the robot's limits exists on the very ground that a run with this seed drives on."""
+    """Whether a path within the robot's limits exists on the very ground that a run with this seed drives on."""
     start, goal = scenario.start, scenario.goals[0]
     clear = coordinates((start, goal))
     ground = scenario.world.heightfield(np.random.default_rng([seed, WORLD_STREAM]), clear)  # type: ignore[union-attr]

@@ -1,4 +1,4 @@
-"""Whether any way at all leads a wheeled robot from one place of a terrain to another within its limits.
+"""Whether any path at all leads a wheeled robot from one place of a terrain to another within its limits.
 
 The judge of an evaluation: it knows the true ground, no map, no cost and no planner, and searches all places and
 headings. Where it says no, a failure is the ground's; where it says yes, it is the navigation's. Use it to sort

@@ -72,12 +72,12 @@ def paint_line(
     """Paint a line through points (n, 3) [m], ``width`` pixels wide, ``nearer`` by a share of its distance."""
     pixels = camera.project(points)
     begin, end = pixels[:-1], pixels[1:]
-    way = end[:, :2] - begin[:, :2]
-    lengths = np.linalg.norm(way, axis=1)
+    along = end[:, :2] - begin[:, :2]
+    lengths = np.linalg.norm(along, axis=1)
     seen = np.isfinite(lengths) & (lengths > 0.0)
-    begin, end, way = begin[seen], end[seen], way[seen] / lengths[seen, None] * 0.5 * width
-    aside = np.column_stack([-way[:, 1], way[:, 0], np.zeros(len(way))])
-    ahead = np.column_stack([way, np.zeros(len(way))])  # pieces overlap, so that bends have no gaps
+    begin, end, along = begin[seen], end[seen], along[seen] / lengths[seen, None] * 0.5 * width
+    aside = np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(along))])
+    ahead = np.column_stack([along, np.zeros(len(along))])  # pieces overlap, so that bends have no gaps
     a, b, c, d = begin - ahead + aside, begin - ahead - aside, end + ahead - aside, end + ahead + aside
     corners = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     corners[:, :, 2] *= 1.0 + nearer

@@ -222,23 +222,23 @@ def seen_plans(plans: Sequence[StampedPoints], times: FloatArray) -> list[Stampe
 
 
 def thinned_plans(plans: Sequence[StampedPoints], most: int = MAX_PLAN_POINTS) -> list[StampedPoints]:
-    """Plans with one point for each ``LEAST_STEP`` of the way, or for each larger step that leaves ``most`` in all."""
+    """Plans with one point for each ``LEAST_STEP`` of the path, or for each larger step that leaves ``most`` in all."""
     along = [_along(points) for _, points in plans]
-    step, longest = LEAST_STEP, max((float(way[-1]) for way in along if len(way)), default=0.0)
-    keep = [_one_for_each(step, way) for way in along]
+    step, longest = LEAST_STEP, max((float(one[-1]) for one in along if len(one)), default=0.0)
+    keep = [_one_for_each(step, one) for one in along]
     while sum(map(np.count_nonzero, keep)) > most and step < longest:
         step *= 2.0
-        keep = [_one_for_each(step, way) for way in along]
+        keep = [_one_for_each(step, one) for one in along]
     return [(time, points[kept]) for (time, points), kept in zip(plans, keep, strict=True)]
 
 
 def _along(points: FloatArray) -> FloatArray:
-    """Way (n,) [m] until each point, each piece of it measured along its longest axis."""
+    """Length (n,) [m] until each point, each piece of it measured along its longest axis."""
     return np.cumsum(np.abs(np.diff(points, axis=0, prepend=points[:1])).max(axis=1, initial=0.0))
 
 
 def _one_for_each(step: float, along: FloatArray) -> NDArray[np.bool_]:
-    """Mask (n,) of the first point in each step [m] of the way, and of both ends."""
+    """Mask (n,) of the first point in each step [m] of the path, and of both ends."""
     keep = np.diff(np.floor(along / step + 1e-6), prepend=-1.0) > 0.0  # points at the step's own distance all stay
     keep[-1:] = True
     return keep

@@ -1,0 +1,114 @@
+"""What a mesh map answers from its snapshot: the places and the motions of the core's map contract.
+
+No lock is held while a question is answered.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.maps.navigation_map import PlaceCheck
+from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
+from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.map.places import MeshPlaces
+from mbf_mesh_nav.map.robot_outline import OutlinedMap
+from mbf_mesh_nav.map.snapshot import MeshSnapshot
+from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
+from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE, UNKNOWN_RADIUS, forbidden_ahead, nearest_of
+from mbf_mesh_nav.mesh.topology import MeshTopology
+from mbf_mesh_nav.mesh.turning import pivots, slope_at, swept_obstacle
+
+FORBIDDEN_COST = 1.0
+"""Ground whose cost reaches this is not driven onto in a recovery."""
+
+
+class SnapshotAnswers(OutlinedMap):
+    """The part of a ``MeshMap`` that needs no more than its surface, its snapshot and the robot's size.
+
+    Attributes
+    ----------
+    topology : MeshTopology
+        All arrays in one value; each of them is an attribute of the map, too.
+    locator : SurfaceLocator
+        Nearest-point and ray queries.
+    inscribed_radius : float
+        Radius [m] of the disc that stands for the robot when the server is asked where it fits.
+    footprint : tuple of (x, y)
+        Corners [m] of the robot's outline, for turns on the spot and for contacts with moving objects; empty = that
+        disc.
+    max_turning_slope : float
+        Steeper ground [rad] is not turned on in a recovery.
+    """
+
+    topology: MeshTopology
+    locator: SurfaceLocator
+    inscribed_radius: float = 0.0
+    max_turning_slope: float = 0.35
+
+    @abstractmethod
+    def snapshot(self) -> MeshSnapshot:
+        """Return the current state; cheap, call it once per plan or control cycle."""
+
+    def locate(self, points: ArrayLike, max_distance: float = np.inf) -> Location:
+        """Nearest surface points of many points, see ``SurfaceLocator.locate``."""
+        return self.locator.locate(points, max_distance)
+
+    def locate_one(self, point: ArrayLike, max_distance: float = np.inf, hint_face: int = -1) -> SurfacePoint | None:
+        """Nearest surface point of one point or None, see ``SurfaceLocator.locate_one``."""
+        return self.locator.locate_one(point, max_distance, hint_face)
+
+    def places(self) -> MeshPlaces:
+        """What can be asked of places, on the map as it is now."""
+        return MeshPlaces(self.topology, self.locator, self.snapshot(), self.inscribed_radius)
+
+    def point_check(self) -> PlaceCheck:
+        """State and interpolated cost of the surface at points."""
+        return self.places().check_point
+
+    def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
+        """State and summed cost below the robot's disc."""
+        places = self.places()
+        return places.check_point if center_only else lambda pose: places.check_pose(pose, query)
+
+    def find_valid_pose(
+        self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
+    ) -> PoseAnswer:
+        """Nearest pose where the disc fits; a disc has no heading, so the angle does not matter."""
+        return self.places().find_valid_pose(pose, dist_tolerance, query)
+
+    def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
+        """Where the robot would come onto forbidden ground or past a border, or that it is too steep to turn.
+
+        A motion that turns about a place within the robot's outline is a turn on the spot, even if it creeps.
+        """
+        place = self.locate_one(pose.position, SURFACE_DISTANCE)
+        if place is None:
+            return f"the robot is more than {SURFACE_DISTANCE:g} m from the surface"
+        turns = pivots(command, self.robot_reach)
+        if turns and (slope := slope_at(self.topology, place)) > self.max_turning_slope:
+            return f"the ground slopes {slope:.2f} rad, turning is allowed up to {self.max_turning_slope:g} rad"
+        ranks = self.snapshot().traversability_rank(FORBIDDEN_COST)
+        if turns and self.footprint:
+            swept = swept_obstacle(self.topology, ranks, place, pose, command, duration, self.footprint)
+            if swept:
+                return swept
+        radius = self.inscribed_radius or UNKNOWN_RADIUS
+        return forbidden_ahead(self.topology, ranks, place, pose, command, duration, radius)
+
+    def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
+        """Offset [m] to the nearest lethal vertex of the robot's storey; None if none is ``within`` [m]."""
+        place = self.locate_one(pose.position, SURFACE_DISTANCE)
+        if place is None:
+            return None
+        snapshot = self.snapshot()
+        lethal = np.asarray(snapshot.lethal | np.isposinf(snapshot.costs))
+        return nearest_of(self.topology, place, pose, within, lethal)
+
+    def heights_below(self, points: FloatArray) -> FloatArray:
+        """Height (n,) [m] of the first surface straight below each point (n, 3) [m], nan where there is none."""
+        _, distances = self.locator.cast_rays(points, (0.0, 0.0, -1.0))
+        return np.where(np.isfinite(distances), points[:, 2] - distances, np.nan)
