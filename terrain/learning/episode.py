@@ -116,8 +116,9 @@ class Episode:
     def drive(self, command: Twist) -> float:
         """Send a command and let a step's time pass; return by how much the distance left has become shorter [m].
 
-        The distance left is the rest of the plan and the distance from it; it also changes with the plan, so that the sum
-        over an episode with one goal is the first distance less the last one. What the simulation raises is raised here.
+        The distance left is the rest of the plan and the distance from it; it also changes with the plan, so that the
+        sum over an episode with one goal is the first distance less the last one. What the simulation raises is raised
+        here.
         """
         session = self.session
         if self._replan_at <= session.clock.now() + TIME_TOLERANCE:  # as in a run: the next command is on the new plan
