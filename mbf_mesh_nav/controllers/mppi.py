@@ -40,7 +40,8 @@ from mbf_mesh_nav.motion.goal_approach import (
     missed_path,
     tracker_on_surface,
 )
-from mbf_mesh_nav.plugins import MeshContext, MeshController
+from mbf_mesh_nav.motion.surface_follower import SurfaceFollower
+from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.search.final_approach import with_final_approach, with_first_turn
 
 _NOISE_HOLD = 3  # steps a noise value is kept for: explores further than independent noise of the same size
@@ -90,13 +91,12 @@ class MPPIParameters(PluginParameters):
     moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
 
 
-class MPPIController(MeshController):
+class MPPIController(SurfaceFollower):
     """Sampling controller that avoids what the map shows now."""
 
     Parameters = MPPIParameters
     parameters: MPPIParameters
 
-    _approach: GoalApproach | None = None
     _hindered_by = ""
 
     def __init__(self, context: MeshContext) -> None:
@@ -165,20 +165,18 @@ class MPPIController(MeshController):
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle: locate, sample around the last motion, score, blend, check."""
-        if self._approach is None:
-            return ControlResult(ExePathOutcome.INVALID_PATH, "there is no plan to follow")
         p, pose = self.parameters, request.pose
-        spot = self.mesh_map.locate_one(pose.position, p.max_surface_distance)
-        if spot is None:
-            message = f"the robot is more than {p.max_surface_distance:g} m from the surface"
-            return ControlResult(ExePathOutcome.OUT_OF_MAP, message)
+        cycle = self.begin_cycle(pose, p.max_surface_distance)
+        if isinstance(cycle, ControlResult):
+            return cycle
+        spot, approach = cycle
         if not self._begun:
             self._begin(spot, pose)
         self._tracker.update(spot.point)
         if missed := missed_path(self._tracker, p.max_path_distance * self.limit_factor):
             return missed
-        if self._approach.is_only_turning(pose, self._tracker):
-            off = heading_error(pose, self._approach.goal)
+        if approach.is_only_turning(pose, self._tracker):
+            off = heading_error(pose, approach.goal)
             self._idle_cycles += p.motion_model == "ackermann"
             if self._idle_cycles > _IDLE_CYCLES:
                 message = f"the goal is reached but for {off:.2f} rad, which a car cannot correct where it stands"
@@ -198,12 +196,6 @@ class MPPIController(MeshController):
             return None
         speed, yaw_rate = np.moveaxis(self._as_motions(self._nominal), -1, 0)
         return PlannedMotion(np.stack([speed, np.zeros_like(speed), yaw_rate], axis=1), self.parameters.model_dt)
-
-    def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
-        """Whether the path has been driven to its last pose, and that is reached."""
-        if self._approach is None:
-            return False
-        return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
 
     def _best_motion(self, spot: SurfacePoint, pose: Pose) -> FloatArray | None:
         """Blend the sampled motions by their scores; (time_steps, 2), or None if no motion makes progress."""

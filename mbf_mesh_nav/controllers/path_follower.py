@@ -30,7 +30,7 @@ from mbf_mesh_nav.motion.goal_approach import (
     missed_path,
     tracker_on_surface,
 )
-from mbf_mesh_nav.plugins import MeshController
+from mbf_mesh_nav.motion.surface_follower import SurfaceFollower
 
 OBSTACLE_STEP = 0.1  # m between two looks along the path
 
@@ -67,13 +67,11 @@ class PathFollowerParameters(PluginParameters):
     )
 
 
-class PathFollower(MeshController):
+class PathFollower(SurfaceFollower):
     """Pure pursuit on the surface."""
 
     Parameters = PathFollowerParameters
     parameters: PathFollowerParameters
-
-    _approach: GoalApproach | None = None
 
     @classmethod
     def reach(cls, parameters: PathFollowerParameters) -> float:
@@ -96,30 +94,22 @@ class PathFollower(MeshController):
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle: locate, project onto the path, pursue the point ahead."""
-        if self._approach is None:
-            return ControlResult(ExePathOutcome.INVALID_PATH, "there is no plan to follow")
         pose = request.pose
-        surface = self.mesh_map.locate_one(pose.position, self.parameters.max_surface_distance)
-        if surface is None:
-            reach = self.parameters.max_surface_distance
-            return ControlResult(ExePathOutcome.OUT_OF_MAP, f"the robot is more than {reach:g} m from the surface")
+        cycle = self.begin_cycle(pose, self.parameters.max_surface_distance)
+        if isinstance(cycle, ControlResult):
+            return cycle
+        surface, approach = cycle
         self._tracker.update(surface.point)
         if missed := missed_path(self._tracker, self.parameters.max_path_distance * self.limit_factor):
             return missed
-        if self._approach.is_only_turning(pose, self._tracker):
-            turn = self.parameters.turn_gain * heading_error(pose, self._approach.goal)
+        if approach.is_only_turning(pose, self._tracker):
+            turn = self.parameters.turn_gain * heading_error(pose, approach.goal)
             return self._command(0.0, turn)
         blocked_in = self._distance_to_obstacle(surface.point)
         if blocked_in is not None:
             return ControlResult(ExePathOutcome.BLOCKED_PATH, f"the path is blocked {blocked_in:.2f} m ahead")
         slope = math.acos(clamp(float(self.mesh_map.face_normals[surface.face, 2]), 1.0))
         return self._pursue(pose, slope)
-
-    def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
-        """Whether the path has been driven to its last pose, and that is reached."""
-        if self._approach is None:
-            return False
-        return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
 
     def _distance_to_obstacle(self, here: FloatArray) -> float | None:
         """Distance [m] along the path to the first place that the map forbids now; None without one in reach.

@@ -22,8 +22,8 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, tracker_on_surface
+from mbf_mesh_nav.motion.surface_follower import SurfaceFollower
 from mbf_mesh_nav.motion.vector_field import VectorField
-from mbf_mesh_nav.plugins import MeshController
 
 STRAYING = 2.0
 """The field leads to the goal from anywhere, not back to the path: a robot off the path comes to its end otherwise."""
@@ -50,13 +50,13 @@ class VectorFieldParameters(PluginParameters):
     )
 
 
-class VectorFieldController(MeshController):
+class VectorFieldController(SurfaceFollower):
     """Follows the field of the plan it executes."""
 
     Parameters = VectorFieldParameters
     parameters: VectorFieldParameters
 
-    _approach: GoalApproach | None = None
+    _face = -1
 
     @property
     def turns_on_the_spot(self) -> bool:
@@ -73,34 +73,31 @@ class VectorFieldController(MeshController):
         self._fields: tuple[VectorField, ...] = fields
         self._tracker = tracker_on_surface(self.mesh_map, self._last_leg(path), self.parameters.max_surface_distance)
         self._approach = GoalApproach(path[-1], self.parameters.goal_distance, STRAYING)
-        self._leg = 0
-        self._face = -1
+        self._leg, self._face = 0, -1
         return True
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle: locate, look up the direction, apply the law."""
-        if self._approach is None:
-            return ControlResult(ExePathOutcome.INVALID_PATH, "there is no plan to follow")
         pose = request.pose
-        reach = self.parameters.max_surface_distance
-        spot = self.mesh_map.locate_one(pose.position, reach, self._face)
-        if spot is None:
-            return ControlResult(ExePathOutcome.OUT_OF_MAP, f"the robot is more than {reach:g} m from the surface")
+        cycle = self.begin_cycle(pose, self.parameters.max_surface_distance, self._face)
+        if isinstance(cycle, ControlResult):
+            return cycle
+        spot, approach = cycle
         self._face = spot.face
         self._pass_via(spot.point)
-        if self._on_last_leg and self._approach.is_only_turning(pose, self._tracker):
-            return self._command(0.0, self._turn_rate(heading_error(pose, self._approach.goal)))
+        if self._on_last_leg and approach.is_only_turning(pose, self._tracker):
+            return self._command(0.0, self._turn_rate(heading_error(pose, approach.goal)))
         direction = self._fields[self._leg].direction_at(self.mesh_map, spot)
         if direction is None:
             return ControlResult(ExePathOutcome.MISSED_PATH, "the field does not lead on from here; plan again")
         ahead = rotated_back(pose.rotation, direction)
-        return self._steer(math.atan2(ahead[1], ahead[0]), ground_distance(pose, self._approach.goal))
+        return self._steer(math.atan2(ahead[1], ahead[0]), ground_distance(pose, approach.goal))
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the last leg has been driven to its end, and the last pose of the plan is reached."""
         if self._approach is None or not self._on_last_leg:
             return False
-        return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
+        return super().is_goal_reached(pose, dist_tolerance, angle_tolerance)
 
     @property
     def _on_last_leg(self) -> bool:
