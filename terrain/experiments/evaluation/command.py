@@ -72,7 +72,7 @@ def outdoor(
     ),
 ) -> None:
     """Judge your planner or controller on rough ground, beside the shipped ones."""
-    asked = _asked(context, planner, controller, settings, backend, name, beside, workers, time_limit, as_json, out)
+    asked = _asked(context)
     with readable_errors():
         from terrain.experiments.evaluation.bench import bench
         from terrain.experiments.evaluation.outdoor import outdoor as protocol
@@ -99,7 +99,7 @@ def indoor(
     ),
 ) -> None:
     """Judge your planner or controller among posts that only a lidar sees, beside the shipped ones."""
-    asked = _asked(context, planner, controller, settings, backend, name, beside, workers, time_limit, as_json, out)
+    asked = _asked(context)
     with readable_errors():
         from terrain.experiments.evaluation.bench import bench
         from terrain.experiments.evaluation.indoor import indoor as protocol
@@ -129,7 +129,7 @@ def moving(
     ),
 ) -> None:
     """Judge your planner or controller among people who walk, beside the shipped ones."""
-    asked = _asked(context, planner, controller, settings, backend, name, beside, workers, time_limit, as_json, out)
+    asked = _asked(context)
     with readable_errors():
         from terrain.experiments.evaluation.bench import bench
         from terrain.experiments.evaluation.moving import moving as protocol
@@ -152,23 +152,14 @@ def _levels(text: str) -> list[int]:
     return levels
 
 
-def _asked(
-    context: typer.Context,
-    planner: str,
-    controller: str,
-    settings: list[str],
-    backend: str,
-    name: str,
-    beside: list[str],
-    workers: int,
-    time_limit: float,
-    as_json: bool,
-    out: Path,
-) -> Asked:
+def _asked(context: typer.Context) -> Asked:
+    """What the options ask for that all parts have."""
     from terrain.commands.run import settings_of
     from terrain.experiments.evaluation.bench import Asked
 
-    chosen = settings_of(settings, planner=planner, controller=controller)
-    if not chosen and not beside:
+    given = context.params
+    chosen = settings_of(given["settings"], planner=given["planner"], controller=given["controller"])
+    if not chosen and not given["beside"]:
         raise typer.BadParameter("nothing to judge: give --planner, --controller, --set or --beside")
-    return Asked(chosen, backend, name, beside, workers, time_limit, as_json, out, command_line(context))
+    shared = (given[name] for name in ("backend", "name", "beside", "workers", "time_limit", "as_json"))
+    return Asked(chosen, *shared, Path(given["out"]), command_line(context))
