@@ -199,7 +199,7 @@ class PickByMotion(Composite):
     Parameters
     ----------
     by_motion : mapping of Motion to Behaviour
-        A motion that is missing makes the node fail, so that somebody plans around the object.
+        A motion that is missing makes the node fail. One node may stand for several motions, and for nobody.
     nobody : Behaviour
         Where no tracked object is in the way.
     length : float
@@ -211,7 +211,7 @@ class PickByMotion(Composite):
     def __init__(
         self, name: str, by_motion: Mapping[Motion, Behaviour], nobody: Behaviour, length: float = 3.0
     ) -> None:
-        super().__init__(name, [*by_motion.values(), nobody])
+        super().__init__(name, list(dict.fromkeys([*by_motion.values(), nobody])))
         self.by_motion = dict(by_motion)
         self.nobody = nobody
         self.length = length

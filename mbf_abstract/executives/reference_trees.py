@@ -59,8 +59,9 @@ class TreeOptions:
     clear, out_of_collision, relax_planner, relax_controller, move_away : str
         Recovery behaviours by what they are for; empty = none.
     wait, give_way : str
-        Where a tracked object blocks the path: ``wait`` for one that moves; for one that stands ``wait``, then
-        ``give_way``; one that is parked is planned around at once. Empty, the default: nobody asks.
+        Where a tracked object blocks the path: ``wait`` for one that moves, and no second planner; for one that
+        stands ``wait``, then a plan around it, then ``give_way``; one that is parked is planned around at once.
+        Empty, the default: nobody asks.
     check_poses : bool
         Whether navigation first looks whether robot and goal stand free.
     second_planner_pause : float
@@ -169,7 +170,14 @@ def _second_planner(options: TreeOptions) -> Behaviour:
     if options.second_planner_look_ahead <= 0.0:
         return update
     blocked = PathBlocked("path blocked?", options.second_planner_look_ahead)
-    return Sequence("update a blocked path", memory=True, children=[blocked, update])
+    return Sequence("update a blocked path", memory=True, children=[blocked, _unless_it_moves(options, update)])
+
+
+def _unless_it_moves(options: TreeOptions, update: Behaviour) -> Behaviour:
+    """What moves is waited for: a path around where it is now would lead through where it goes."""
+    if not options.wait:
+        return update
+    return PickByMotion("who blocks it?", dict.fromkeys((Motion.WAITING, Motion.PARKED), update), nobody=update)
 
 
 def _recovery(options: TreeOptions) -> Behaviour:
@@ -192,7 +200,11 @@ def _unblock(options: TreeOptions) -> Behaviour:
     usual = _in_turn("unblock", o.clear, o.relax_controller, o.out_of_collision)
     if not (o.wait and o.give_way):
         return usual
-    by_motion = {Motion.MOVING: Recovery(o.wait), Motion.WAITING: _in_turn("yield", o.wait, o.give_way)}
+    around = UpdatePath("plan around it", o.planner, longest=o.longest_update, refiner=o.refiner)
+    by_motion = {
+        Motion.MOVING: Recovery(o.wait),
+        Motion.WAITING: RoundRobin("yield", [Recovery(o.wait), around, Recovery(o.give_way)]),
+    }
     return PickByMotion("who is in the way?", by_motion, nobody=usual)
 
 

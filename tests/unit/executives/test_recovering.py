@@ -278,3 +278,11 @@ def test_what_was_tried_against_one_that_waits_is_remembered_while_others_pass(s
     for motion in (Motion.WAITING, Motion.MOVING, Motion.WAITING):
         assert tick(among(tree, (motion, 1.0))) == "S"
     assert (wait.ticks, give_way.ticks) == (1, 1)
+
+
+def test_one_node_may_stand_for_several_motions_and_for_nobody(scripted, tick):
+    tree = PickByMotion("who?", dict.fromkeys((Motion.WAITING, Motion.PARKED), plan := scripted("S")), nobody=plan)
+    for blockages in ([(Motion.WAITING, 1.0)], [(Motion.PARKED, 1.0)], []):
+        assert tick(among(tree, *blockages)) == "S"
+    assert tick(among(tree, (Motion.MOVING, 1.0))) == "F"
+    assert plan.ticks == 3

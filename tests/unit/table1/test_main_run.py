@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 
 from terrain.experiments.table1.environments import traffic
-from terrain.experiments.table1.environments.traffic import CARRIER, HALF_WIDTH, make_traffic
+from terrain.experiments.table1.environments.traffic import CARRIER, HALF_WIDTH, Box, make_traffic, run_ahead
 from terrain.experiments.table1.main_run import buildings, conditions, run, table, trial
 from terrain.experiments.table1.main_run.conditions import CONDITIONS
 from terrain.experiments.table1.main_run.floor_plans import draw_world, has_ways_around
@@ -54,6 +54,24 @@ def test_a_seed_draws_the_same_plan_each_time_and_others_draw_others():
     assert draw_world(100) == PLANS[0]
     assert len({world.waypoints for world in PLANS}) == len(PLANS)
     assert {world.routes[0][0][0] < world.waypoints[2][0] for world in PLANS} == {True, False}  # mirrored and not
+
+
+def test_two_seeds_drive_the_first_half_of_the_round_and_two_the_second():
+    building = buildings.buildings(None)["warehouse"]
+    halves = [building.half_round(seed) for seed in range(4)]
+    assert [half.goals()[0] for half in halves] == [building.world(0).goals()[i] for i in (0, 0, 3, 3)]
+    assert halves[2].start[:2] == building.world(0).waypoints[2][:2]
+
+
+def test_the_others_have_driven_on_when_a_run_begins_and_do_not_touch_each_other():
+    for seed in range(100, 108):
+        half = buildings.buildings(None)["plans"].half_round(seed)
+        shuttles = make_traffic(half.routes, 5, True, np.random.default_rng(seed))
+        before = [shuttle.box for shuttle in shuttles]
+        run_ahead(shuttles, buildings.head_start(seed), Box(*half.start))
+        boxes = [shuttle.box for shuttle in shuttles]
+        assert all(box != at_first for box, at_first in zip(boxes, before, strict=True))
+        assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in [*boxes[:i], Box(*half.start)])
 
 
 # ------------------------------------------------------------------------------------------------ rows

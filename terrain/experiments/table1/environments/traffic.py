@@ -46,6 +46,7 @@ DWELL = 5.0  # s; how long it stands at each corner, to load
 SPEED_RANGE = (0.25, 0.5)  # m/s
 PHASE_RANGE = (0.0, 0.08)
 CORNER_REACHED = 1e-6  # m
+AHEAD_STEP = 0.05  # s; of the time before a run
 
 
 @dataclass(frozen=True)
@@ -196,6 +197,13 @@ def make_traffic(
         Shuttle(route, float(speed), float(phase), polite)
         for route, (speed, phase) in zip(routes[:count], draws, strict=False)
     ]
+
+
+def run_ahead(shuttles: Sequence[Shuttle], seconds: float, standing: Box) -> None:
+    """Let the robots drive for a while before a run, around one that stands; routes and phases alone begin alike."""
+    for _ in range(round(seconds / AHEAD_STEP)):
+        for shuttle in shuttles:
+            shuttle.advance(AHEAD_STEP, [standing, *(other.box for other in shuttles if other is not shuttle)])
 
 
 class TrafficRays:

@@ -15,7 +15,7 @@ import numpy as np
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
 from terrain.experiments.table1.conditions import Surroundings
-from terrain.experiments.table1.environments.traffic import CARRIER, TrafficRays, make_traffic
+from terrain.experiments.table1.environments.traffic import CARRIER, TrafficRays, make_traffic, run_ahead
 from terrain.experiments.table1.environments.warehouse_world import WarehouseRobot, WarehouseWorld
 from terrain.experiments.table1.environments.world import World
 from terrain.experiments.table1.plugin_wrappers import SOURCE, wrap_plugins
@@ -45,12 +45,21 @@ class WarehouseEnvironment(SimulationSession):
         Of traffic, sensors, plugins and planner latencies.
     navigation : Path
         Configuration of the server; ``$WORLD_MAP`` in it becomes the map.
+    head_start : float
+        How long [s] the others have been driving when the run begins.
     """
 
     max_events = 1_000_000
     rates = LoopRates(period=0.05, ticks_per_sample=1)
 
-    def __init__(self, world: World, surroundings: Surroundings, seed: int, navigation: Path = NAVIGATION) -> None:
+    def __init__(
+        self,
+        world: World,
+        surroundings: Surroundings,
+        seed: int,
+        navigation: Path = NAVIGATION,
+        head_start: float = 0.0,
+    ) -> None:
         self._goals = world.goals()
         self._moves = False
         grid = world.grid()
@@ -58,6 +67,7 @@ class WarehouseEnvironment(SimulationSession):
             world.routes, surroundings.robots, surroundings.polite, np.random.default_rng([seed, TRAFFIC_STREAM])
         )
         self.robot = WarehouseRobot(WarehouseWorld(grid, traffic, self._report_contact), Pose.planar(*world.start))
+        run_ahead(traffic, head_start, self.robot.box)
         lidar = Lidar(
             self.robot,
             "lidar",

@@ -9,14 +9,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mbf_abstract.geometry import Pose
 from terrain.experiments.table1.environments.world import WAREHOUSE, World, load_world
 from terrain.experiments.table1.main_run import floor_plans
 from terrain.experiments.table1.main_run.floor_plans import PlanarPoint, PlanarPose, draw_world, has_ways_around
 from terrain.worlds.occupancy import OccupancyGrid
 
+HEAD_START = (30.0, 240.0)  # s; for so long the others have been driving when a run begins
+HEAD_START_STREAM = 5  # beside the streams of the environment and of the floor plans
 LEGS = 3  # of the six waypoints of a world a seed drives the first three or the last three
 WITH, WITHOUT = "with ways around", "without"
+
+
+def head_start(seed: int) -> float:
+    """How long [s] the others have been driving when the run of a seed begins."""
+    rng = np.random.default_rng([seed, HEAD_START_STREAM])
+    return float(rng.uniform(*HEAD_START))
 
 
 @dataclass(frozen=True)
@@ -79,8 +89,8 @@ class Building:
         grid = world.grid()
         floor = hashlib.sha256(grid.occupied.tobytes() + grid.free.tobytes()).hexdigest()
         goals = [[goal.x, goal.y, goal.yaw] for goal in world.goals()]
-        found = {"floor": floor, "start": world.start, "goals": goals, "routes": world.routes, "legs": LEGS}
-        return {**self.constants, **found}
+        found = {"floor": floor, "start": world.start, "goals": goals, "routes": world.routes}
+        return {**self.constants, **found, "legs": LEGS, "head_start": HEAD_START}
 
     def group(self, seed: int) -> str:
         """Name of the rows of a seed in the table."""

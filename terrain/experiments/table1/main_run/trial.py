@@ -15,7 +15,7 @@ from terrain.experiments.table1 import counting, plugin_wrappers, repetition
 from terrain.experiments.table1.counting import Leg, Tally
 from terrain.experiments.table1.environments import traffic
 from terrain.experiments.table1.environments import warehouse_environment as warehouse
-from terrain.experiments.table1.main_run.buildings import buildings
+from terrain.experiments.table1.main_run.buildings import buildings, head_start
 from terrain.experiments.table1.main_run.conditions import CONDITIONS
 
 NAVIGATION = Path(__file__).with_name("navigation.yaml")
@@ -67,8 +67,10 @@ def hash_of_parameters(building: str, depot: Path | None) -> str:
 def run_trial(trial: Trial) -> dict[str, Any]:
     """Drive and return the row."""
     started = wall_seconds()
-    condition, world = CONDITIONS[trial.condition], buildings(trial.depot)[trial.building].half_round(trial.seed)
-    with warehouse.WarehouseEnvironment(world, condition.base.surroundings, trial.seed, NAVIGATION) as environment:
+    condition, building = CONDITIONS[trial.condition], buildings(trial.depot)[trial.building]
+    world, ahead = building.half_round(trial.seed), head_start(trial.seed)
+    surroundings = condition.base.surroundings
+    with warehouse.WarehouseEnvironment(world, surroundings, trial.seed, NAVIGATION, ahead) as environment:
         run = repetition.drive(environment, condition.executive(environment.navigator), started)
     return {**row_of(run.tally), "digest": run.digest[:12], "seconds": round(run.wall_time, 1)}
 
