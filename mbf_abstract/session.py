@@ -18,7 +18,8 @@ from typing import TypeVar
 
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.drive.robot import Robot
-from mbf_abstract.events import EventBus, EventSink, MemorySink
+from mbf_abstract.events import EventBus, EventKind, EventSink, MemorySink
+from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
@@ -54,6 +55,8 @@ class NavigationSession:
         Of the server, once there is one.
     sensor_mounts : dict of str to Transform
         Where the range sensors of a simulated robot sit on it, static, by their names.
+    on_initial_pose : list of callables
+        Take an initial pose: what localises the robot, or leads there. Called on any thread; must not wait.
     """
 
     navigator: Navigator
@@ -63,6 +66,7 @@ class NavigationSession:
         self.memory = MemorySink(max_events)
         self.events = EventBus(self.clock.now, [self.memory, *sinks])
         self.sensor_mounts: dict[str, Transform] = {}
+        self.on_initial_pose: list[Callable[[Pose], None]] = []
         self._closing = ExitStack()
         self.on_close(self.events.close)
         self.on_close(self._let_threads_end)
@@ -87,6 +91,24 @@ class NavigationSession:
         self.on_close(server.close)
         self.navigator = Navigator(server)
         return server
+
+    def set_initial_pose(self, pose: Pose) -> None:
+        """Hand a pose of the robot, in the global frame, to what localises it, as ``/initialpose`` does.
+
+        Raises
+        ------
+        ValueError
+            The pose is in another frame, or nothing here leads to a localisation.
+        """
+        known = self.navigator.server.config.parameters.global_frame
+        if pose.frame_id != known:
+            raise ValueError(f"expected an initial pose in the frame {known!r}, got {pose.frame_id!r}")
+        if not self.on_initial_pose:
+            raise ValueError("an initial pose is of no use: nothing here localises the robot")
+        x, y, yaw = (round(value, 3) for value in (pose.x, pose.y, pose.yaw))
+        self.events.emit(EventKind.CUSTOM, "localization", what="initial pose", x=x, y=y, yaw=yaw)
+        for listener in self.on_initial_pose:
+            listener(pose)
 
     def on_close(self, call: Callable[[], object]) -> None:
         """Let the session end with this call; what was made last ends first."""

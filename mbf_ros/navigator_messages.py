@@ -23,9 +23,9 @@ from mbf_abstract.time.clock import Clock
 from mbf_ros.map_messages import Audience, Output, map_messages
 from mbf_ros.messages import maps
 from mbf_ros.messages.diagnostics import diagnostics
-from mbf_ros.messages.geometry import MessageContext, path_message, pose_stamped
+from mbf_ros.messages.geometry import MessageContext, initial_pose_message, path_message, pose_stamped
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.robot_inputs import Quality
+from mbf_ros.robot_inputs import INITIAL_POSE, INITIAL_POSE_TYPE, Quality
 
 MAX_EVENTS = 1000
 LOOK_AHEAD = 3.0  # m of the path that are the local plan
@@ -37,6 +37,8 @@ VECTOR_FIELD = Output("~/vector_field", "visualization_msgs/MarkerArray", Qualit
 LOCAL_PLAN = Output("local_plan", "nav_msgs/Path")
 FOOTPRINT = Output("~/footprint", "geometry_msgs/PolygonStamped")
 DIAGNOSTICS = Output("/diagnostics", "diagnostic_msgs/DiagnosticArray", shared=True)
+LOCALIZATION = Output(INITIAL_POSE, INITIAL_POSE_TYPE, shared=True)
+"""Where an app says that the robot is, for a localisation on the robot's side."""
 EVENTS = Output("~/events", "std_msgs/String", depth=MAX_EVENTS)
 
 
@@ -56,6 +58,8 @@ class NavigatorMessages:
         What is wrong with each topic that must come, empty for one that comes, by topic.
     map_period : float
         Least time [s] between two messages of a map.
+    robot_localizes : bool
+        Whether what localises the robot is on its side; then ``session.set_initial_pose`` leads there.
 
     Attributes
     ----------
@@ -70,12 +74,13 @@ class NavigatorMessages:
         audience: Callable[[str], Audience],
         inputs: Callable[[], Mapping[str, str]] = dict,
         map_period: float = 1.0,
+        robot_localizes: bool = False,
     ) -> None:
         self._session, self._server = session, session.navigator.server
         self._real_time, self._context, self._audience, self._inputs = real_time, context, audience, inputs
         self._maps = map_messages(self._server, context, audience)
         own = (PLAN, GOAL, VECTOR_FIELD, LOCAL_PLAN, FOOTPRINT, DIAGNOSTICS, EVENTS)
-        self.outputs = (*own, *(output for one in self._maps for output in one.outputs))
+        self.outputs: tuple[Output, ...] = (*own, *(output for one in self._maps for output in one.outputs))
         self._periodic = (
             (map_period, self._map_messages),
             (ROBOT_PERIOD, self._robot_messages),
@@ -87,12 +92,18 @@ class NavigatorMessages:
         self._shown_plan: Path | None = None
         self._shown_field: tuple[Path, int] | None = None  # its plan, and how many had begun to listen
         self._goal: Pose | None = None
+        self._initial_poses: deque[Pose] = deque(maxlen=1)
+        if robot_localizes:
+            self.outputs += (LOCALIZATION,)
+            session.on_initial_pose.append(self._initial_poses.append)
         self._server.get_path.listeners.append(self._take_plan)
         session.events.add_sink(self)
 
     def close(self) -> None:
         """Listen to the navigator no more."""
         self._session.events.remove_sink(self)
+        if LOCALIZATION in self.outputs:
+            self._session.on_initial_pose.remove(self._initial_poses.append)
         self._server.get_path.listeners.remove(self._take_plan)
 
     def write(self, event: Event) -> None:
@@ -104,6 +115,9 @@ class NavigatorMessages:
         yield from self._plan_messages()
         yield from self._goal_messages()
         yield from self._event_messages()
+        while self._initial_poses:
+            stamp = self._session.clock.now()
+            yield LOCALIZATION.topic, initial_pose_message(self._initial_poses.popleft(), stamp, self._context())
         now = self._real_time.now()
         for i, (period, messages) in enumerate(self._periodic):
             if now >= self._due[i]:

@@ -11,6 +11,7 @@ from enum import Enum
 from functools import partial
 
 from mbf_abstract.event_values import error_text
+from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.goal_types import MoveBaseGoal
@@ -19,13 +20,14 @@ from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_ros.messages.floors import floor_of, floor_window_of
-from mbf_ros.messages.geometry import MessageContext, odometry_of, pose_of, transforms_of
+from mbf_ros.messages.geometry import MessageContext, initial_pose_of, odometry_of, pose_of, transforms_of
 from mbf_ros.messages.interfaces import Message, MessageError
 from mbf_ros.messages.sensors import SENSORS
 from mbf_ros.ros2.robot import RosRobot
 
 ODOM, TF, TF_STATIC = "odom", "/tf", "/tf_static"
 GOALS = ("goal_pose", "move_base_simple/goal")
+INITIAL_POSE, INITIAL_POSE_TYPE = "initialpose", "geometry_msgs/PoseWithCovarianceStamped"
 Take = Callable[[Message], None]
 DEPTH = 100
 
@@ -134,6 +136,14 @@ class RobotInputs:
 
         for topic in GOALS:
             yield Input(topic, "geometry_msgs/PoseStamped", Quality.MANY, go_to)
+
+    def of_localization(self, set_initial_pose: Callable[[Pose], None]) -> Iterator[Input]:
+        """Yield where somebody says that the robot is, for a robot whose localisation is on this side."""
+
+        def take(message: Message) -> None:
+            set_initial_pose(initial_pose_of(message, self.context()))
+
+        yield Input(INITIAL_POSE, INITIAL_POSE_TYPE, Quality.MANY, take)
 
     def _take_floor(
         self,

@@ -20,6 +20,8 @@ from mbf_ros.messages.interfaces import Message, MessageError
 
 NANOSECONDS = 1_000_000_000
 NO_COVARIANCE = np.zeros(36)
+SAID_POSITION, SAID_YAW = 0.5, math.radians(15.0)
+"""Standard deviations [m, rad] of where somebody says that a robot is; those of the tools of RViz."""
 
 
 class InvalidValueError(MessageError):
@@ -123,6 +125,18 @@ def pose_of(message: Mapping[str, Any], context: MessageContext, where: str = "p
         return Pose(vector_of(body["position"]), rotation, frame, stamp)
     except ValueError as error:
         raise InvalidValueError(f"{where}: {error}") from error
+
+
+def initial_pose_of(message: Mapping[str, Any], context: MessageContext) -> Pose:
+    """Return the pose of a PoseWithCovarianceStamped; raises InvalidValueError as ``pose_of``."""
+    return pose_of({"header": message["header"], "pose": message["pose"]["pose"]}, context, "initial pose")
+
+
+def initial_pose_message(value: Pose, stamp: float, context: MessageContext) -> Message:
+    """Return a PoseWithCovarianceStamped of what somebody has said at ``stamp`` [s]."""
+    covariance = np.zeros(36)
+    covariance[[0, 7, 35]] = SAID_POSITION**2, SAID_POSITION**2, SAID_YAW**2
+    return {"header": context.header(value.frame_id, stamp), "pose": {"pose": pose(value), "covariance": covariance}}
 
 
 def path_message(value: Path | None, context: MessageContext) -> Message:

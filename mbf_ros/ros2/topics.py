@@ -120,7 +120,9 @@ class Outputs:
         map_period: float,
     ) -> None:
         self._node = node
-        self._messages = NavigatorMessages(session, real_time, context, self._audience, problems, map_period)
+        self._messages = NavigatorMessages(
+            session, real_time, context, self._audience, problems, map_period, robot_localizes=True
+        )
         made = ((one, self._made(one)) for one in self._messages.outputs)
         self._publishers = {one.topic: (one.type, publisher) for one, publisher in made if publisher is not None}
         self._audiences = dict.fromkeys(self._publishers, Audience(0, 0))

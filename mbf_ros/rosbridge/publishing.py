@@ -66,7 +66,7 @@ class Publisher:
         self._stamped_commands = stamped_commands
         self._next_status = 0.0
         self._messages = NavigatorMessages(
-            session, session.clock, lambda: context, self._audience, problems, map_period
+            session, session.clock, lambda: context, self._audience, problems, map_period, robot_localizes=not simulated
         )
         self._outputs = {one.topic: node_topic(one) for one in self._messages.outputs}
         self._add_topics()

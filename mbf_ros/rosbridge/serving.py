@@ -18,12 +18,14 @@ from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import unix_seconds
 from mbf_abstract.time.ticker import Ticker
 from mbf_ros.messages.geometry import MessageContext
+from mbf_ros.robot_inputs import RobotInputs
 from mbf_ros.rosbridge.actionlib import ActionlibServer
 from mbf_ros.rosbridge.authentication import Authentication
 from mbf_ros.rosbridge.bridge import Bridge
 from mbf_ros.rosbridge.client import Client
 from mbf_ros.rosbridge.navigation import NODE, ServerParameters, serve_navigator
 from mbf_ros.rosbridge.page import page_files
+from mbf_ros.rosbridge.protocol import absolute
 from mbf_ros.rosbridge.publishing import Publisher
 from mbf_ros.rosbridge.rosapi import serve_rosapi
 from mbf_ros.rosbridge_robot.topic_robot import WATCH_PERIOD, TopicRobot
@@ -37,6 +39,12 @@ def rosbridge_server(bridge: Bridge, events: EventBus, options: ServerOptions) -
     """Return a server of a bridge and its page, not started yet."""
     offer = Offer("rosbridge", extra="bridge", origin_option="--allow-origin", pages=page_files(), takes_auth=True)
     return WebSocketServer(bridge, events, options, offer)
+
+
+def take_initial_poses(bridge: Bridge, session: NavigationSession, context: MessageContext) -> None:
+    """Let clients say where a simulated robot is."""
+    for one in RobotInputs(session.clock.now, lambda: context).of_localization(session.set_initial_pose):
+        bridge.topics.add_input(absolute(one.topic), one.type, one.take)
 
 
 @dataclass(frozen=True)
@@ -95,6 +103,8 @@ def serve_session(
     actionlib = ActionlibServer(bridge.topics, navigator, context, clock.now, server.post)
     if robot is not None:
         robot.listen(bridge.topics, context, navigator.server, options.sensors)
+    else:
+        take_initial_poses(bridge, session, context)
     with ExitStack() as closing:
         publisher = Publisher(
             session,

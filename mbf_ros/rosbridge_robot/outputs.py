@@ -11,14 +11,14 @@ from mbf_abstract.time.clock import Clock
 from mbf_abstract.time.ticker import Ticker
 from mbf_ros.map_messages import Audience
 from mbf_ros.messages.geometry import MessageContext, command_twist, twist, twist_stamped
-from mbf_ros.navigator_messages import DIAGNOSTICS, FOOTPRINT, GOAL, LOCAL_PLAN, PLAN, NavigatorMessages
+from mbf_ros.navigator_messages import DIAGNOSTICS, FOOTPRINT, GOAL, LOCAL_PLAN, LOCALIZATION, PLAN, NavigatorMessages
 from mbf_ros.rosbridge.navigation import node_topic
 from mbf_ros.rosbridge.protocol import frame
 from mbf_ros.rosbridge_robot.connection import Connection, NotConnectedError
 
 CMD_VEL = "/cmd_vel"
 PERIOD = 0.1  # s between two looks at what is new
-SHOWN = (PLAN, GOAL, LOCAL_PLAN, FOOTPRINT, DIAGNOSTICS)
+SHOWN = (PLAN, GOAL, LOCAL_PLAN, FOOTPRINT, DIAGNOSTICS, LOCALIZATION)
 """What is published although nobody is known to listen; maps would fill the connection."""
 
 
@@ -75,7 +75,7 @@ class ShownTopics:
         problems: Callable[[], Mapping[str, str]],
     ) -> None:
         self._connection = connection
-        self._messages = NavigatorMessages(session, real_time, context, _audience, problems)
+        self._messages = NavigatorMessages(session, real_time, context, _audience, problems, robot_localizes=True)
         self._last: dict[str, str] = {}
         self._ticker = Ticker(real_time, session.events, self._publish, PERIOD, "robot link publisher")
 

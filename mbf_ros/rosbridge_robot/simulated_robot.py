@@ -17,7 +17,7 @@ from mbf_ros.messages.interfaces import Message
 from mbf_ros.rosbridge.authentication import Authentication
 from mbf_ros.rosbridge.bridge import Bridge
 from mbf_ros.rosbridge.protocol import frame
-from mbf_ros.rosbridge.serving import BridgeOptions, RosbridgeServer, rosbridge_server
+from mbf_ros.rosbridge.serving import BridgeOptions, RosbridgeServer, rosbridge_server, take_initial_poses
 from mbf_ros.rosbridge_robot.robot_state import RobotState
 
 PERIOD = 0.05  # s between two looks at the robot
@@ -56,6 +56,7 @@ def serve_robot(session: NavigationSession, options: BridgeOptions | None = None
 
     kind = "geometry_msgs/TwistStamped" if options.stamped_commands else "geometry_msgs/Twist"
     bridge.topics.add_input("/cmd_vel", kind, drive)
+    take_initial_poses(bridge, session, context)
     with ExitStack() as closing:
         closing.callback(lease.release)
         state = RobotState(session, bridge.topics, context, send)

@@ -120,6 +120,9 @@ NO_NOISE = PoseNoise()
 class Localization(Sensor[Pose]):
     """The pose of base_link in map as a localisation would give it: ground truth, noise, and an offset that can jump.
 
+    It can be given a pose (``seat``). From then on it follows the robot's motion from there, and stays as
+    wrong as that pose was: it does not find back by itself.
+
     Parameters
     ----------
     noise : PoseNoise
@@ -134,14 +137,36 @@ class Localization(Sensor[Pose]):
         super().__init__(robot, RATE, rng)
         self.noise = noise
         self.offset: Vector3 = (0.0, 0.0, 0.0)
+        self._asked: Pose | None = None
+        self._seat: tuple[Pose, Pose] | None = None  # where the robot was, and where it was said to be
+
+    def seat(self, pose: Pose) -> None:
+        """Take x, y and heading of a pose for those of the robot at the next measurement. On any thread."""
+        self._asked = pose
 
     def _sense(self, stamp: float) -> Pose:
         noise, drawn = self.noise, self.rng.normal(size=6).tolist()
         dx, dy, dyaw = self.offset
         shift = (dx + noise.position * drawn[0], dy + noise.position * drawn[1])
-        pose = _shifted(self.robot.pose(), *shift, dyaw + noise.yaw * drawn[2], stamp)
+        pose = _shifted(self._seated(self.robot.pose()), *shift, dyaw + noise.yaw * drawn[2], stamp)
         raised = (pose.x, pose.y, pose.z + noise.height * drawn[3])
         return replace(pose, position=raised, orientation=self._tilted(pose.orientation, drawn[4], drawn[5]))
+
+    def _seated(self, truth: Pose) -> Pose:
+        """Where the robot would be, had it moved as it did from where it was said to be; before offset and noise."""
+        asked, self._asked = self._asked, None
+        if asked is not None:
+            dx, dy, dyaw = self.offset  # is added again
+            self._seat = truth, Pose.planar(asked.x - dx, asked.y - dy, asked.yaw - dyaw)
+        if self._seat is None:
+            return truth
+        was, said = self._seat
+        turn = said.yaw - was.yaw
+        cos, sin = math.cos(turn), math.sin(turn)
+        dx, dy = truth.x - was.x, truth.y - was.y
+        place = (said.x + cos * dx - sin * dy, said.y + sin * dx + cos * dy, truth.z)
+        orientation = quaternion_multiply(quaternion_from_yaw(turn), truth.orientation)
+        return replace(truth, position=place, orientation=orientation)
 
     def _tilted(self, orientation: Quaternion, roll: float, pitch: float) -> Quaternion:
         """Turn an orientation about its own x and y axis by so many standard deviations."""

@@ -102,6 +102,7 @@ class SimulationSession(NavigationSession, ABC):
         clock = clock or (WallClock() if options.wall_clock else SimClock())
         self.digest = RunDigest(clock.now)
         super().__init__(clock, [self.digest, *options.sinks], self.max_events)
+        self.on_initial_pose.append(localization.seat)
         robot = ClockedRobot(simulation, send or simulation.robot.send_command, self.digest)
         options.on_step("building the map")
         server = self.serve(*read_config(config_file), robot, seed=options.seed or 0)

@@ -1,5 +1,7 @@
 """The robot of a simulation as a node of ROS 2: it publishes time and its state, and takes ``cmd_vel``.
 
+On ``initialpose`` its localisation is given where the robot is.
+
 The node has no thread that publishes: the simulation asks for that after each step, so that time, transforms and
 scans leave together.
 """
@@ -16,10 +18,12 @@ from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import WallClock
 from mbf_ros.messages.geometry import InvalidValueError, MessageContext, pose_stamped, twist_of
 from mbf_ros.messages.interfaces import Message
+from mbf_ros.robot_inputs import INITIAL_POSE_TYPE, RobotInputs
 from mbf_ros.robot_messages import SENSOR_TOPICS, STATE_TOPICS, TF, TF_STATIC, RobotMessages, state_topics
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
 from mbf_ros.ros2.running import Spinner, require_ros_2, ros_2
 from mbf_ros.ros2.simulation.newest_command import NewestCommand
+from mbf_ros.ros2.topics import Inputs
 
 NODE = "simulator"
 CLOCK, CMD_VEL, GOAL = "/clock", "cmd_vel", "~/goal"
@@ -38,7 +42,7 @@ def robot_connector(stamped_commands: bool) -> Callable[[NavigationSession], Sim
         ROS 2, or a package of messages, is missing: before a world is built in vain.
     """
     require_ros_2()
-    for kind in STATE_TOPICS.values():
+    for kind in (*STATE_TOPICS.values(), INITIAL_POSE_TYPE):
         interface_class(kind)
     return partial(SimulatedRobot, stamped_commands=stamped_commands)
 
@@ -115,6 +119,8 @@ class SimulatedRobot:
         }
         command = interface_class("geometry_msgs/TwistStamped" if stamped_commands else "geometry_msgs/Twist")
         self._node.create_subscription(command, CMD_VEL, self._taking(stamped_commands), usual)
+        inputs = RobotInputs(self._session.clock.now, lambda: self._context)
+        Inputs(self._node).listen(inputs.of_localization(self._session.set_initial_pose))
         self._state = RobotMessages(self._session, self._context, self._is_wanted)
         closing.callback(self._state.close)
         spinner = Spinner(self._node, self._real_time, self._newest.fail)

@@ -184,7 +184,12 @@ class LiveFoxglove:
         self.access = server_options.access
         self._controls = controls = LiveControls(session, sequence, SOURCE, "Foxglove")
         steering = Steering(
-            session.navigator.server, controls.go_to_pose, controls.cancel, controls.hold, controls.post
+            session.navigator.server,
+            controls.go_to_pose,
+            controls.cancel,
+            controls.hold,
+            session.set_initial_pose,
+            controls.post,
         )
         name = f"mbf {session.scenario.name}"
         self._server = LiveServer(name, RunFeed(session), steering, server_options, note)

@@ -51,7 +51,7 @@ def serve_robot(
         websockets is not installed, or nothing can listen there.
     """
     robot = SteeredRobot(session, send)
-    steering = Steering(session.navigator.server, robot.go_to, robot.cancel, robot.hold)
+    steering = Steering(session.navigator.server, robot.go_to, robot.cancel, robot.hold, robot.set_initial_pose)
     feed = RunFeed(session) if isinstance(session, Session) else RobotFeed(session, name)
     began = 0.0 if isinstance(feed, RunFeed) else feed.began
     server = LiveServer(f"mbf {name}", feed, steering, options.server_options(), note, began)
@@ -78,7 +78,7 @@ class SteeredRobot:
     """Goals of clients for a navigator."""
 
     def __init__(self, session: NavigationSession, send: Callable[[MoveBaseGoal], Any]) -> None:
-        self._server, self._send = session.navigator.server, send
+        self._session, self._server, self._send = session, session.navigator.server, send
         self._holding, self._lock = False, threading.Lock()  # two threads pause goals
 
     def go_to(self, goal: Pose) -> None:
@@ -89,6 +89,13 @@ class SteeredRobot:
             raise ProtocolError(str(error)) from error
         if handle.done and handle.result is not None:
             raise ProtocolError(handle.result.message)
+
+    def set_initial_pose(self, pose: Pose) -> None:
+        """Say where the robot is; raises ProtocolError where that is of no use."""
+        try:
+            self._session.set_initial_pose(pose)
+        except ValueError as error:
+            raise ProtocolError(str(error)) from error
 
     def cancel(self) -> None:
         """End all goals."""

@@ -169,7 +169,7 @@ class FoxgloveService:
         def advertise(one: Any) -> None:
             number, topic = number_in(one, "id"), text_in(one, "topic")
             if topic not in INPUTS:
-                text = f"{topic[:80]!r}: nobody listens; goals come on {' and '.join(INPUTS)}"
+                text = f"{topic[:80]!r}: nobody listens; poses and places are taken on {', '.join(INPUTS)}"
                 client.outbox.newest(UNHEARD, protocol.status(Level.INFO, text))
                 return
             if text_in(one, "encoding") != "json":

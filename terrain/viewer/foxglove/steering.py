@@ -1,4 +1,4 @@
-"""What clients may do to a robot: goals by topics, services, parameters.
+"""What clients may do to a robot: goals and initial poses by topics, services, parameters.
 
 Goals come as the app's 3D panel publishes them. Its tool clicks on the plane z = 0; a height of 0 is therefore none,
 and the ground's is taken, else that of the storey that is nearest.
@@ -16,8 +16,12 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from terrain.viewer.foxglove.protocol import ProtocolError
 
-GOAL, POINT = "/move_base_simple/goal", "/clicked_point"
-INPUTS = {GOAL: "geometry_msgs/PoseStamped", POINT: "geometry_msgs/PointStamped"}
+GOAL, POINT, INITIAL_POSE = "/move_base_simple/goal", "/clicked_point", "/initialpose"
+INPUTS = {
+    GOAL: "geometry_msgs/PoseStamped",
+    POINT: "geometry_msgs/PointStamped",
+    INITIAL_POSE: "geometry_msgs/PoseWithCovarianceStamped",
+}
 """Topics that clients publish on, and the types of their messages, as JSON."""
 CANCEL, PAUSE, RESUME = "/cancel", "/pause", "/resume"
 SERVICES = {
@@ -40,6 +44,8 @@ class Steering:
         Ends all goals.
     hold : callable
         Pauses all goals (True), or lets them go on.
+    set_initial_pose : callable
+        Takes where somebody says that the robot is; raises ValueError where that is of no use.
     post : callable
         Calls a function where goals may be sent, at once or later, and never waits.
     """
@@ -50,13 +56,19 @@ class Steering:
         go_to: Callable[[Pose], object],
         cancel: Callable[[], object],
         hold: Callable[[bool], object],
+        set_initial_pose: Callable[[Pose], None],
         post: Callable[[Callable[[], None]], None] = lambda call: call(),
     ) -> None:
         self.post = post
         self._server, self._go_to, self._cancel, self._hold = server, go_to, cancel, hold
+        self._set_initial_pose = set_initial_pose
 
     def take(self, topic: str, message: Any) -> None:
         """Take a message of one of the ``INPUTS``; raises ProtocolError where it means nothing."""
+        if topic == INITIAL_POSE:
+            said = self._pose(_without_covariance(message))
+            self.post(lambda: self._set_initial_pose(said))
+            return
         goal = self._goal(message) if topic == GOAL else self._point(message)
         self.post(lambda: _ignore(self._go_to(goal())))
 
@@ -80,14 +92,18 @@ class Steering:
         self._server.set_parameters(**changes)
 
     def _goal(self, message: Any) -> Callable[[], Pose]:
-        """A pose with a heading."""
+        """A pose with a heading, on the ground."""
+        pose = self._pose(message)
+        return lambda: self._on_ground(pose.x, pose.y, pose.z, pose.yaw)
+
+    def _pose(self, message: Any) -> Pose:
         self._check_frame(message)
         x, y, z = _numbers(message, "pose", "position", "xyz")
         qx, qy, qz, qw = _numbers(message, "pose", "orientation", "xyzw")
         if qx * qx + qy * qy + qz * qz + qw * qw < 1e-6:
             raise ProtocolError("the orientation is no quaternion: all of it is 0")
         yaw = math.atan2(2.0 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)
-        return lambda: self._on_ground(x, y, z, yaw)
+        return Pose.planar(x, y, yaw, z, frame_id=self._server.config.parameters.global_frame)
 
     def _point(self, message: Any) -> Callable[[], Pose]:
         """A place, to be reached with the heading in which the robot sees it now."""
@@ -113,8 +129,14 @@ class Steering:
         known = self._server.config.parameters.global_frame
         if not isinstance(frame, str) or frame.lstrip("/") != known:
             raise ProtocolError(
-                f"expected a goal in the frame {known!r}, got {frame!r:.80}: choose it as display frame"
+                f"expected a pose in the frame {known!r}, got {frame!r:.80}: choose it as display frame"
             )
+
+
+def _without_covariance(message: Any) -> Any:
+    """A PoseWithCovarianceStamped as a PoseStamped, if it is one."""
+    body = message.get("pose") if isinstance(message, dict) else None
+    return {**message, "pose": body.get("pose")} if isinstance(body, dict) else message
 
 
 def _numbers(message: Any, part: str, inner: str, names: str) -> list[float]:

@@ -10,6 +10,8 @@ import roslibpy
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal, MoveBaseGoal
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.testing.scripted_session import ScriptedSession
+from mbf_abstract.time.clock import WallClock
 
 
 def listen(answers, ros, name, kind, **fields):
@@ -66,6 +68,21 @@ def test_a_scan_is_seen_as_laser_scan_and_points_in_the_frame_of_the_sensor(serv
     assert scan["ranges"][0] is None and cloud["width"] == 2
     points = np.frombuffer(base64.b64decode(cloud["data"]), "<f4").reshape(-1, 3)
     np.testing.assert_allclose(points, [(2.0, 0.01, 0.0), (0.0, 3.0, 0.0)], atol=1e-6)
+
+
+def test_where_a_client_says_that_a_simulated_robot_is_its_localisation_is_told(serving, connect, answers, raw, ask):
+    session, said = ScriptedSession(clock=WallClock()), answers()
+    session.on_initial_pose.append(said)
+    _, server = serving(session)
+    ros = connect(server.port)
+    topic = roslibpy.Topic(ros, "/initialpose", "geometry_msgs/PoseWithCovarianceStamped")
+    pose = {"position": {"x": 2.0, "y": 1.0}, "orientation": {"w": 1.0}}
+    topic.publish({"header": {"frame_id": "/map"}, "pose": {"pose": pose}})
+    (got,) = said.wait()
+    assert (got.frame_id, got.x, got.y) == ("map", 2.0, 1.0)
+    message = {"header": {"frame_id": "odom"}, "pose": {"pose": pose}}
+    answer = ask(raw(server.port), {"op": "publish", "topic": "/initialpose", "msg": message}, "status")
+    assert "expected an initial pose in the frame 'map', got 'odom'" in answer["msg"]
 
 
 def test_clients_hear_each_other_through_the_server_and_late_ones_get_what_is_latched(serving, connect, answers):

@@ -15,7 +15,7 @@ from mbf_abstract.time.sim_clock import SimClock
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_ros.map_messages import WHOLE_PERIOD, Audience, GridMessages
 from mbf_ros.messages import maps
-from mbf_ros.messages.geometry import MessageContext
+from mbf_ros.messages.geometry import MessageContext, initial_pose_of
 from mbf_ros.messages.interfaces import completed
 from mbf_ros.navigator_messages import LOOK_AHEAD, NavigatorMessages, path_ahead
 
@@ -81,6 +81,23 @@ def site(tmp_path, request):
     with made.session:
         yield made
         made.messages.close()
+
+
+def test_where_somebody_says_that_the_robot_is_goes_to_a_localisation_on_its_side(site):
+    with pytest.raises(ValueError, match="nothing here localises the robot"):
+        site.session.set_initial_pose(Pose.planar(2.0, 1.0))
+    messages = NavigatorMessages(
+        site.session, site.clock, MessageContext, lambda topic: Audience(0, 0), robot_localizes=True
+    )
+    with pytest.raises(ValueError, match="in the frame 'map', got 'odom'"):
+        site.session.set_initial_pose(Pose.planar(2.0, 1.0, frame_id="odom"))
+    site.session.set_initial_pose(Pose.planar(2.0, 1.0, 0.5))
+    ((topic, message),) = messages.changes()
+    assert topic == "initialpose" and list(messages.changes()) == []
+    completed("geometry_msgs/PoseWithCovarianceStamped", message)
+    assert initial_pose_of(message, MessageContext()).yaw == pytest.approx(0.5)
+    messages.close()
+    assert site.session.on_initial_pose == []
 
 
 both = pytest.mark.parametrize("site", ["costmap", "mesh"], indirect=True)

@@ -137,6 +137,24 @@ def test_perfect_wheel_odometry_follows_an_arc_and_a_real_one_drifts() -> None:
     assert 0.01 < drifted.pose.distance_to(truth) < 0.5
 
 
+def test_localisation_follows_the_robot_from_where_it_was_told_that_it_is() -> None:
+    robot = PosedRobot(Pose.planar(1.0, 2.0, 0.5))
+    localization = Localization(robot, rng())
+    localization.offset = (0.1, 0.0, 0.0)  # a fault that began before
+    localization.seat(Pose.planar(4.0, 3.0, 0.5 + math.pi / 2.0))
+    there = localization.measure(0.0)
+    assert there is not None and (there.x, there.y, there.yaw) == pytest.approx((4.0, 3.0, 0.5 + math.pi / 2.0))
+    robot.place = Pose((2.0, 2.0, 0.3), Pose.planar(0.0, 0.0, 0.7).orientation)
+    moved = localization.measure(0.1)
+    assert moved is not None and moved.position == pytest.approx((4.0, 4.0, 0.3))
+    assert moved.yaw == pytest.approx(0.7 + math.pi / 2.0)
+    localization.seat(robot.place)
+    assert localization.measure(0.15) == robot.place.stamped(0.15)
+    localization.offset = (0.0, 0.0, 0.0)
+    found = localization.measure(0.2)
+    assert found is not None and (found.x, found.y, found.yaw) == pytest.approx((1.9, 2.0, 0.7)), "the fault has ended"
+
+
 def test_localisation_jumps_when_asked_to() -> None:
     localization = Localization(PosedRobot(Pose.planar(1.0, 2.0, 0.5)), rng())
     before = localization.measure(0.0)

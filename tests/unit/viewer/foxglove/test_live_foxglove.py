@@ -1,6 +1,7 @@
 """A real run, seen and steered by a real client of the protocol: what it shows, what it takes, and who is refused."""
 
 import json
+import math
 import struct
 from functools import partial
 
@@ -194,7 +195,7 @@ def test_rubbish_is_answered_and_the_connection_stays(idle_app, frame, text):
 
 def test_one_wrong_entry_of_a_list_drops_no_other(served, client):
     app = client(served())
-    channels = [{"id": 1, "topic": topic, "encoding": "json"} for topic in ("/initialpose", "/clicked_point")]
+    channels = [{"id": 1, "topic": topic, "encoding": "json"} for topic in ("/goal_pose", "/clicked_point")]
     channels[1]["id"] = 2
     app.send({"op": "advertise", "channels": channels})
     answer = app.operation("status")
@@ -224,10 +225,25 @@ def test_a_change_that_a_plugin_does_not_survive_is_answered(served, client, mon
     assert app.operation("status")["message"] == "RuntimeError: the plugin is broken"
 
 
+def test_where_somebody_says_that_the_robot_is_the_localisation_believes(served, client):
+    run = served()
+    app = client(run)
+    app.subscribe("/events")
+    app.until(lambda: finished(app))
+    said = {"position": {"x": 4.0, "y": 2.5, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 1.0, "w": 1.0}}
+    app.publish("/initialpose", {**HERE, "pose": {"pose": said, "covariance": [0.0] * 36}})
+    app.until(lambda: [one for one in app.messages["/events"] if one["source"] == "localization"])
+    stamp, robot = run.session.clock.now(), run.session.navigator.robot_pose
+    app.until(lambda: robot().stamp > stamp)
+    assert (robot().x, robot().y, robot().yaw) == pytest.approx((4.0, 2.5, math.pi / 2.0), abs=0.05)
+    app.publish("/initialpose", {**HERE, "pose": said})
+    assert "pose.position: expected the numbers" in app.operation("status")["message"]
+
+
 @pytest.mark.parametrize(
     ("message", "text"),
     [
-        ([], "expected a goal in the frame 'map', got None"),
+        ([], "expected a pose in the frame 'map', got None"),
         ({**GOAL, "header": {"frame_id": "odom"}}, "got 'odom': choose it as display frame"),
         ({**GOAL, "pose": {}}, "pose.position: expected the numbers x, y, z"),
         ({**GOAL, "pose": GOAL["pose"] | {"orientation": dict.fromkeys("xyzw", 0)}}, "no quaternion"),

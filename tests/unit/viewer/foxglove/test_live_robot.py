@@ -282,6 +282,9 @@ def test_a_goal_that_is_not_taken_is_answered_with_the_reason(robot, client):
     app = client(robot(refuse))
     app.publish("/clicked_point", POINT)
     assert app.operation("status")["message"] == "the navigator is not ready"
+    said = {"position": {"x": 2.0, "y": 1.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+    app.publish("/initialpose", {**POINT, "pose": {"pose": said}}, number=8)
+    assert "nothing here localises the robot" in app.operation("status")["message"]
 
 
 @pytest.mark.parametrize(
