@@ -1,6 +1,6 @@
 """Runs a controller: the loop that drives (reference: ``mbf.md`` 4.4, with the safe default everywhere).
 
-Each period, in this order: a new plan? canceled? paused? map current, pose and velocity fresh? arrived? stuck or
+Each period, in this order: a new plan? canceled? paused? pose and velocity fresh, map current? arrived? stuck or
 oscillating? then the plugin is asked for a command, the command is judged and sent, and feedback is published.
 Whatever ends the loop, the lease is given back and the robot stands. Differences to upstream: ``docs/decisions``.
 """
@@ -124,13 +124,13 @@ class ControllerExecution:
             end = self._handle_cancel()
         if end is not None or self._hold_while_paused(lease):
             return end
-        problem, robot = self._map_problem(), self._runtime.robot
-        if problem:
-            return self._hold(lease, ExePathOutcome.MAP_ERROR, problem)
-        try:
+        robot = self._runtime.robot
+        try:  # first: no map stays current whose robot is lost, and of the two only a map may come back by a recovery
             pose, measured = robot.pose(), self._run.call_beside("the robot's odometry()", robot.measured_velocity)
         except RobotStateError as error:
             return self._hold(lease, ExePathOutcome.TF_ERROR, str(error))
+        if problem := self._map_problem():
+            return self._hold(lease, ExePathOutcome.MAP_ERROR, problem)
         velocity = measured or Twist()
         if self._is_arrived(pose):
             return self._come_to_rest(velocity, lease)
