@@ -4,6 +4,7 @@
     python benchmarks/moving.py --seeds 0:50 --cases bay wide crossing --executive navigation --json results.jsonl
     python benchmarks/moving.py --pairs 100 --first-seed 1000 --json results.jsonl
     python benchmarks/moving.py --pairs 100 --first-seed 1000 --json results.jsonl --without
+    python benchmarks/moving.py --map slope --seeds 0:4 --cases bay wide --executive navigation
 
 Cases: ``head_on`` are two robots in a short corridor of one robot's width, with a bay, without, or closed at one end;
 ``bay`` is a corridor of one robot's width with a pull-out place, ``dead_end`` one of which one robot comes out
@@ -13,8 +14,9 @@ between racks. A seed draws places, goals and headings, for each case by its nam
 of the others as they are; runs up to 6e66dfa had other worlds for the same seeds. Parameters were chosen on seeds 100
 to 199; report others.
 
-``--without`` runs the same robots without ``right_of_way_behavior``. Runs that the file of ``--json`` holds are not run
-again.
+``--without`` runs the same robots without ``right_of_way_behavior``. ``--map`` is what they drive on: a costmap, a mesh
+of the same floor, or a mesh of the same floor on ground that rises along x by a tenth of the way (``slope``). Runs that
+the file of ``--json`` holds are not run again.
 """
 
 from __future__ import annotations
@@ -30,12 +32,13 @@ from typing import Any
 
 import numpy as np
 from moving_worlds import CASES, RESOLUTION, Place
+from numpy.typing import NDArray
 from PIL import Image
 
 from terrain.scenarios.places import PlanarPose
 from terrain.scenarios.robots import OwnRobot, Sensor
 from terrain.scenarios.scenario import Scenario
-from terrain.scenarios.world_types import MapWorld
+from terrain.scenarios.world_types import HeightfieldWorld, MapWorld
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.sweeps.command import parse_seeds
 
@@ -43,17 +46,19 @@ NAMES = ("anna", "ben", "carla", "dora", "emil", "fritz", "greta", "hans", "ida"
 TIME_LIMIT = 240.0  # s for each goal
 QUICK_SEEDS = "0:2"
 
+MAPS = ("costmap", "mesh", "slope")
+RISE, WALL_HEIGHT = 0.1, 1.0  # of the slope along x, as a share, and of the walls on it [m]
+
 Row = dict[str, Any]
-IDENTITY = ("case", "seed", "executive", "right_of_way")
+IDENTITY = ("map", "case", "seed", "executive", "right_of_way")
 """Keys of a row that say which run it is of."""
 
 
-def scenario_of(case: str, seed: int, folder: Path) -> Scenario:
-    """Write the map of a case into a folder and return its scenario."""
+def scenario_of(case: str, seed: int, folder: Path, on: str = "costmap") -> Scenario:
+    """Write the map of a case into a folder and return its scenario on one of ``MAPS``."""
     free, ways = CASES[case](np.random.default_rng([seed, zlib.crc32(case.encode())]))
-    Image.fromarray(np.where(free[::-1], 254, 0).astype(np.uint8)).save(folder / "floor.png")
-    header = f"image: floor.png\nresolution: {RESOLUTION}\norigin: [0.0, 0.0, 0.0]\n"
-    (folder / "floor.yaml").write_text(header + "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n")
+    backend = "costmap" if on == "costmap" else "mesh"
+    settings = Path(__file__).with_name("moving.yaml" if on == "costmap" else "moving_mesh.yaml").resolve()
     robots = tuple(
         OwnRobot(name=name, start=_pose(start), goals=(_pose(goal),))
         for name, (start, goal) in zip(NAMES, ways, strict=False)
@@ -61,9 +66,9 @@ def scenario_of(case: str, seed: int, folder: Path) -> Scenario:
     return Scenario(
         name=case,
         proves="All robots arrive.",
-        backend="costmap",
-        navigation={"costmap": Path(__file__).with_suffix(".yaml").resolve()},
-        world=MapWorld(type="map", file=folder / "floor.yaml"),
+        backend=backend,
+        navigation={backend: settings},
+        world=slope_of(free, folder) if on == "slope" else floor_of(free, folder),
         robot="turtlebot",
         robots=robots,
         sensors=(Sensor(max_range=8.0),),
@@ -72,20 +77,38 @@ def scenario_of(case: str, seed: int, folder: Path) -> Scenario:
     )
 
 
+def floor_of(free: NDArray[np.bool_], folder: Path) -> MapWorld:
+    """Write a floor into a folder, as a building."""
+    Image.fromarray(np.where(free[::-1], 254, 0).astype(np.uint8)).save(folder / "floor.png")
+    header = f"image: floor.png\nresolution: {RESOLUTION}\norigin: [0.0, 0.0, 0.0]\n"
+    (folder / "floor.yaml").write_text(header + "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n")
+    return MapWorld(type="map", file=folder / "floor.yaml")
+
+
+def slope_of(free: NDArray[np.bool_], folder: Path) -> HeightfieldWorld:
+    """Write a floor into a folder, as open ground that rises along x, with blocks where the walls are."""
+    stride = 2  # every second cell: a mesh of all would be slow to plan on
+    cells = free[::stride, ::stride]
+    heights = RISE * stride * RESOLUTION * np.arange(cells.shape[1]) + np.where(cells, 0.0, WALL_HEIGHT)
+    np.savez(folder / "slope.npz", z=heights[::-1], dx=stride * RESOLUTION, dy=stride * RESOLUTION)
+    return HeightfieldWorld(type="heightfield", file=folder / "slope.npz")
+
+
 def _pose(place: Place) -> PlanarPose:
     x, y, yaw = place
     return PlanarPose(x=x, y=y, yaw=yaw)
 
 
-def run(case: str, seed: int, executive: str, right_of_way: bool = True) -> Row:
+def run(case: str, seed: int, executive: str, right_of_way: bool = True, on: str = "costmap") -> Row:
     """Run one case with one seed; who arrived, contacts and recoveries."""
     settings = {} if right_of_way else {"right_of_way_behavior": '""'}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         options = RunOptions(folder / "run", seed=seed, executive=executive, settings=settings)
-        result = run_scenario(scenario_of(case, seed, folder), options)
+        result = run_scenario(scenario_of(case, seed, folder, on), options)
     robots = result.metrics["robots"]
     return {
+        "map": on,
         "case": case,
         "seed": seed,
         "executive": executive,
@@ -104,27 +127,28 @@ def run(case: str, seed: int, executive: str, right_of_way: bool = True) -> Row:
 
 def summary(rows: list[Row]) -> Iterator[str]:
     """One line for each case, executive and arm: runs in which all arrived, legs lost, contacts."""
-    for case, executive, right_of_way in dict.fromkeys(_arm(row) for row in rows):
-        own = [row for row in rows if _arm(row) == (case, executive, right_of_way)]
+    for arm in dict.fromkeys(_arm(row) for row in rows):
+        own = [row for row in rows if _arm(row) == arm]
+        on, case, executive, right_of_way = arm
         resolved = sum(row["arrived"] == row["robots"] for row in own)
         lost, legs = sum(row["robots"] - row["arrived"] for row in own), sum(row["robots"] for row in own)
         contacts, moving = sum(row["contacts"] for row in own), sum(row["contacts_while_moving"] for row in own)
-        arm = "" if right_of_way else "without "
+        way = "" if right_of_way else "without "
         yield (
-            f"{case:14} {executive:12} {arm}resolved {resolved} of {len(own)}, lost legs {lost} of {legs}, contacts "
-            f"between robots {contacts}, contacts in which a robot moved {moving}, median time "
+            f"{on:8} {case:14} {executive:12} {way}resolved {resolved} of {len(own)}, lost legs {lost} of {legs}, "
+            f"contacts between robots {contacts}, contacts in which a robot moved {moving}, median time "
             f"{float(np.median([row['time_s'] for row in own])):.0f} s"
         )
 
 
-def _arm(row: Row) -> tuple[str, str, bool]:
-    return row["case"], row["executive"], row["right_of_way"]
+def _arm(row: Row) -> tuple[str, str, str, bool]:
+    return row["map"], row["case"], row["executive"], row["right_of_way"]
 
 
 def recorded(file: Path | None) -> dict[tuple[Any, ...], Row]:
     """Rows of a file by what run they are of; none if there is no such file yet."""
     lines = file.read_text(encoding="utf-8").splitlines() if file is not None and file.exists() else []
-    rows = map(json.loads, lines)
+    rows = [{"map": "costmap", **json.loads(line)} for line in lines]
     return {tuple(row[key] for key in IDENTITY): row for row in rows}
 
 
@@ -135,6 +159,7 @@ def main() -> None:
     parser.add_argument("--seeds", default="0:10", help="first and one past the last, or a list")
     parser.add_argument("--cases", nargs="*", choices=list(CASES), default=list(CASES))
     parser.add_argument("--executive", nargs="*", default=["move_base", "navigation"])
+    parser.add_argument("--map", choices=MAPS, default=MAPS[0], help="what they drive on")
     parser.add_argument("--pairs", type=int, help="so many pairs of head_on, instead of --cases")
     parser.add_argument("--first-seed", type=int, default=0, help="of --pairs")
     parser.add_argument("--without", action="store_true", help="the same robots without right_of_way_behavior")
@@ -145,9 +170,9 @@ def main() -> None:
         cases, seeds = ["head_on"], f"{asked.first_seed}:{asked.first_seed + asked.pairs}"
     known, rows = recorded(asked.json), []
     for seed, case, executive in product(parse_seeds(seeds), cases, asked.executive):
-        row = known.get((case, seed, executive, not asked.without))
+        row = known.get((asked.map, case, seed, executive, not asked.without))
         if row is None:
-            row = run(case, seed, executive, not asked.without)
+            row = run(case, seed, executive, not asked.without, asked.map)
             print(f"{case} {executive} seed {seed}: {row['arrived']} of {row['robots']}; {row['verdict']}", flush=True)
             if asked.json is not None:
                 with asked.json.open("a", encoding="utf-8") as file:

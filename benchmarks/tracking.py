@@ -7,6 +7,8 @@ of 720 beams at 10 Hz (noise 1 cm). The walls are known, the people are not. Rep
 
 - the velocity error [m/s] of all confirmed objects that are a person's, median and 90th percentile, at all times;
 - the delay [s] of the velocity: that shift of the truth in time by which the errors are least;
+- the delay [s] after turns by more than 45 degrees: until the velocity of a person who was known before, and is known
+  for a second after, is nearer to the new one than to the old one; median and 90th percentile;
 - the share of people in view (at least five hits within 6 m) that are tracked, and objects that are nobody;
 - the time of one scan [ms]: taking it in, from the rays to the objects; thread time, median and 99th percentile.
 """
@@ -38,6 +40,7 @@ from terrain.worlds.upright_solids import SolidRays
 PEOPLE, BEAMS, RATE, RANGE = 20, 720, 10.0, 8.0
 IN_VIEW, FEWEST_HITS, SAME = 6.0, 5, 0.5  # m, -, m
 LAGS = np.arange(0, 16)  # scans
+TURN, BEFORE, AFTER = 0.25 * math.pi, 3, 10  # rad, scans, scans
 MOTIONS = {"stands": Twist(), "drives": Twist.planar(0.4, 0.0, 0.25), "turns": Twist.planar(0.0, 0.0, 1.0)}
 
 
@@ -90,6 +93,22 @@ class Office:
         return self.map.tracked_objects(self.world.time), in_view, thread_time() - began
 
 
+def turn_delays(places: np.ndarray, known: dict[tuple[int, int], np.ndarray]) -> list[float]:
+    """How late turns are noticed [s]; ``places`` (scans, n, 2) [m], ``known`` velocities by scan and person."""
+    steps, delays = np.diff(places, axis=0) * RATE, []  # steps[k] leads from scan k to k + 1
+    for person in range(places.shape[1]):
+        for scan in range(BEFORE, len(steps) - AFTER):  # the turn is between the scans before and at this one
+            old, new = steps[scan - 2, person], steps[scan, person]
+            turn = math.atan2(old[0] * new[1] - old[1] * new[0], float(old @ new))
+            seen = [known.get((scan + k, person)) for k in range(-BEFORE, AFTER)]
+            steady = np.allclose(steps[scan - 3, person], old) and np.allclose(steps[scan + 1, person], new)
+            if abs(turn) < TURN or not steady or any(one is None for one in seen):
+                continue
+            late = [np.hypot(*(one - new)) > 0.5 * np.hypot(*(new - old)) for one in seen[BEFORE:]]
+            delays.append((late.index(False) if False in late else AFTER) / RATE + 0.5 / RATE)
+    return delays
+
+
 def measure(motion: str, seed: int, scans: int) -> dict[str, float]:
     """Numbers of one motion of the robot."""
     office = Office(seed)
@@ -111,6 +130,8 @@ def measure(motion: str, seed: int, scans: int) -> dict[str, float]:
         seen += int(in_view.sum())
         tracked += sum(bool(in_view[person]) for person in found)
     velocities = np.gradient(np.array(truth), 1.0 / RATE, axis=0)
+    known = {(number, person): np.array([vx, vy]) for number, person, vx, vy in estimates}
+    delays = turn_delays(np.array(truth), known) or [math.nan]
     errors = np.array(
         [[math.hypot(vx - v[0], vy - v[1]) for lag in LAGS for v in [velocities[max(number - lag, 0), person]]]
          for number, person, vx, vy in estimates]
@@ -120,6 +141,8 @@ def measure(motion: str, seed: int, scans: int) -> dict[str, float]:
         "velocity_error_median": float(np.median(errors[:, 0])),
         "velocity_error_90": float(np.quantile(errors[:, 0], 0.9)),
         "delay": float(LAGS[int(np.argmin(errors.mean(axis=0)))] / RATE),
+        "turn_delay_median": float(np.median(delays)),
+        "turn_delay_90": float(np.quantile(delays, 0.9)),
         "tracked_share": tracked / max(seen, 1),
         "nobody_share": nobody / max(nobody + len(estimates), 1),
         "scan_ms_median": 1e3 * float(np.median(settled)),

@@ -4,6 +4,9 @@ import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 SOURCE = Path(__file__).resolve().parents[3] / "benchmarks" / "moving.py"
 SPEC = spec_from_file_location("moving", SOURCE)
 moving = sys.modules["moving"] = module_from_spec(SPEC)
@@ -17,3 +20,12 @@ def test_another_case_leaves_the_worlds_of_the_others_as_they_are(tmp_path, monk
     monkeypatch.setitem(moving.CASES, "another", moving.CASES["bay"])
     assert moving.scenario_of("wide", 3, tmp_path).robots == before
     assert moving.scenario_of("wide", 4, tmp_path).robots != before
+
+
+def test_the_same_robots_drive_on_every_map_and_the_slope_rises_by_a_tenth(tmp_path):
+    made = {name: moving.scenario_of("wide", 3, tmp_path, name) for name in moving.MAPS}
+    assert len({scenario.robots for scenario in made.values()}) == 1
+    assert [made[name].backend for name in moving.MAPS] == ["costmap", "mesh", "mesh"]
+    ground = made["slope"].world.heightfield(np.random.default_rng(0), np.zeros((0, 2)))
+    assert ground.height_at(12.0, 3.0) - ground.height_at(8.0, 3.0) == pytest.approx(0.4, abs=0.02)
+    assert ground.height_at(10.0, 5.0) - ground.height_at(10.0, 3.0) == pytest.approx(1.0, abs=0.02), "a wall beside it"
