@@ -3,7 +3,7 @@
     python docs/generate_reference.py            write all of them
     python docs/generate_reference.py --check    write nothing; exit code 1 and the names of pages that are out of date
 
-Written are ``configuration.md`` (every parameter of every model), ``scenario_reference.md`` (every key of a scenario),
+Written are ``configuration*.md`` (every parameter of every model), ``scenario_reference.md`` (every key of a scenario),
 ``commands.md`` (every command of ``mbf``), the example plugins (what ``mbf new`` writes), the listings in the guides
 (the text of the example files), the table of metrics in ``verdict.md``, that of a robot's keys in ``your_robot.md``,
 tables of parameter models that a page names, and the table of ``faults_and_promises.md`` (the docstrings of
@@ -21,7 +21,7 @@ import sys
 from pathlib import Path
 
 from command_tables import commands_page
-from parameter_tables import configuration_page, parameter_table
+from parameter_tables import configuration_pages, parameter_table
 from scenario_tables import scenario_page
 
 from mbf_abstract.commands.new import plugin_source
@@ -36,11 +36,12 @@ EXAMPLES = {
     "straight_on_costmap": ("planner", "costmap"),
     "chase_on_mesh": ("controller", "mesh"),
     "chase_on_costmap": ("controller", "costmap"),
-    "look_around": ("recovery", "mesh"),
+    "follow_carrot": ("controller", ""),
+    "look_around": ("recovery", ""),
     "flooded_ground": ("layer", "mesh"),
     "wet_floor": ("layer", "costmap"),
 }
-"""Example plugins that are what ``mbf new`` writes: module -> kind and map."""
+"""Example plugins that are what ``mbf new`` writes: module -> kind and map; without a map they run on every one."""
 
 LISTING = re.compile(r"(<!-- listing: (?P<file>\S+) -->\n)(?:```python\n.*?\n```\n)?", re.DOTALL)
 TABLE = re.compile(r"(<!-- table: tests/faults -->\n)(?:\|.*\n)*")
@@ -53,11 +54,8 @@ FAULT_ROW = re.compile(r"Fault table, rows? (?P<rows>[\d, and]+)[^:]*: (?P<text>
 
 def generate() -> dict[Path, str]:
     """Return every generated file with the text it should have."""
-    texts = {
-        DOCS / "configuration.md": configuration_page(),
-        DOCS / "scenario_reference.md": scenario_page(),
-        DOCS / "commands.md": commands_page(),
-    }
+    texts = {DOCS / name: text for name, text in configuration_pages().items()}
+    texts |= {DOCS / "scenario_reference.md": scenario_page(), DOCS / "commands.md": commands_page()}
     for name, (kind, map_name) in EXAMPLES.items():
         texts[REPOSITORY / "examples" / "plugins" / f"{name}.py"] = plugin_source(kind, name, map_name)
     for page in sorted(DOCS.glob("*.md")):

@@ -1,4 +1,4 @@
-"""A controller that needs no map and so runs on every backend.
+"""Controller `follow_carrot`: steer at a point of the path ahead; it needs no map and so runs on every backend.
 
 When to use: open ground, and first tries of a backend of your own. When not: obstacles move; it looks at the path only.
 """

@@ -1,8 +1,8 @@
-"""``mbf new``: a small installable package with a plugin that works and a test that checks its contract.
+"""``mbf new``: a small installable package with a plugin or an executive that works, and a test that passes.
 
-The core knows no map, so the templates are data of the map's own package: the folder ``templates`` beside its server
-holds ``<kind>.py.txt`` and ``test_<kind>.py.txt`` with ``$name`` and ``$class_name``. A new backend gets this command
-by adding such a folder. Kinds that are the same on every map have their template here.
+The core knows no map, so templates for a map are data of the map's own package: the folder ``templates`` beside its
+server holds ``<kind>.py.txt`` and ``test_<kind>.py.txt`` with ``$name`` and ``$class_name``. A new backend gets this
+command by adding such a folder. What runs on every map has its templates here, in ``templates/any_map``.
 """
 
 from __future__ import annotations
@@ -19,6 +19,15 @@ from mbf_abstract.commands.reporting import readable_errors
 
 GROUPS = {"planner": "planners", "controller": "controllers", "recovery": "recoveries", "layer": "{map}_layers"}
 """Kind of a plugin -> last word of its entry-point group."""
+EXECUTIVE = "executive"
+KINDS = (*GROUPS, EXECUTIVE)
+ANY_MAP = "commands/templates/any_map"
+
+ENTRY_POINT = """\
+# The name before "=" is the type that a configuration {where} writes: {{name: ..., type: {name}}}
+[project.entry-points."mbf.{group}"]
+"{type_name}" = "{name}:{class_name}"
+"""
 
 
 def register(app: typer.Typer) -> None:
@@ -27,12 +36,17 @@ def register(app: typer.Typer) -> None:
 
 
 def new(
-    kind: str = typer.Argument(..., help=f"One of {', '.join(GROUPS)}."),
+    kind: str = typer.Argument(..., help=f"One of {', '.join(KINDS)}."),
     name: str = typer.Argument(..., help="Name of the package and of the type in a configuration, e.g. my_planner."),
-    map_name: str = typer.Option(..., "--map", help="The map it works on: mesh, costmap or another installed backend."),
+    map_name: str = typer.Option(
+        "", "--map", help="The map it works on: mesh, costmap or another installed backend; without it, every map."
+    ),
     out: Path = typer.Option(Path("."), "--out", help="Folder to put the package's folder into."),
 ) -> None:
-    """Write a plugin package: pyproject.toml with its entry point, a module that works, a test that passes."""
+    """Write a package: pyproject.toml with its entry point, a module that works, a test that passes.
+
+    A planner and a layer need a map. An executive runs on every one; a controller and a recovery may.
+    """
     with readable_errors():
         package = write_package(kind, name.replace("-", "_"), map_name, out)
     typer.echo(f"wrote {package}")
@@ -45,14 +59,14 @@ def write_package(kind: str, name: str, map_name: str, out: Path) -> Path:
     Raises
     ------
     ValueError
-        No such kind or map, the map has no template of this kind, or the name is no lower-case module name.
+        No such kind or map, the kind does not go with the map, or the name is no lower-case module name.
     FileExistsError
         The folder is there already; nothing is overwritten.
     """
     texts = {
         f"{name}.py": plugin_source(kind, name, map_name),
-        f"tests/test_{name}.py": _fill(_package_of(map_name), f"templates/test_{kind}.py.txt", kind, name, map_name),
-        "pyproject.toml": _fill("mbf_abstract", "commands/templates/pyproject.toml.txt", kind, name, map_name),
+        f"tests/test_{name}.py": _fill(*_place(f"test_{kind}.py.txt", map_name), name),
+        "pyproject.toml": _project(kind, name, map_name),
     }
     package = out / name
     package.mkdir(parents=True)
@@ -62,16 +76,22 @@ def write_package(kind: str, name: str, map_name: str, out: Path) -> Path:
     return package
 
 
-def plugin_source(kind: str, name: str, map_name: str) -> str:
-    """Return the text of the plugin's module; raises ValueError as ``write_package`` does."""
-    if kind not in GROUPS:
-        raise ValueError(f"no kind {kind!r}; known: {', '.join(GROUPS)}")
+def plugin_source(kind: str, name: str, map_name: str = "") -> str:
+    """Return the text of the package's module; raises ValueError as ``write_package`` does."""
+    if kind not in KINDS:
+        raise ValueError(f"no kind {kind!r}; known: {', '.join(KINDS)}")
     if not name.isidentifier() or name != name.lower() or keyword.iskeyword(name):
         raise ValueError(f"{name!r} is no name for a module: lower-case letters, digits and underscores")
-    package, template = _package_of(map_name), f"{kind}.py.txt"
-    if files("mbf_abstract").joinpath(f"commands/templates/{template}").is_file():
-        return _fill("mbf_abstract", f"commands/templates/{template}", kind, name, map_name)
-    return _fill(package, f"templates/{template}", kind, name, map_name)
+    template = f"{kind}.py.txt"
+    on_any_map = files("mbf_abstract").joinpath(ANY_MAP, template).is_file()
+    if kind == EXECUTIVE and map_name:
+        raise ValueError(f"an executive runs on every map: leave out --map {map_name}")
+    if not map_name and not on_any_map:
+        raise ValueError(f"a {kind} needs a map: --map {' or --map '.join(_maps_with(template))}")
+    package, path = _place(template, map_name)
+    if map_name and on_any_map and not files(package).joinpath(path).is_file():
+        package, path = _place(template, "")  # a recovery is the same on every map, its test is not
+    return _fill(package, path, name)
 
 
 def class_name(name: str) -> str:
@@ -79,23 +99,54 @@ def class_name(name: str) -> str:
     return "".join(word.capitalize() for word in name.split("_"))
 
 
-def _package_of(map_name: str) -> str:
-    """Top-level package of an installed map server."""
-    servers = {point.name: point.module for point in entry_points(group="mbf.servers")}
+def _project(kind: str, name: str, map_name: str) -> str:
+    """Text of ``pyproject.toml``; an executive needs no entry point, ``--executive`` takes module and function."""
+    entry_point = ""
+    if kind != EXECUTIVE:
+        entry_point = ENTRY_POINT.format(
+            where=f'of "backend: {map_name}"' if map_name else "of any backend",
+            name=name,
+            group=GROUPS[kind].format(map=map_name),
+            type_name=f"{map_name}.{name}" if map_name else name,
+            class_name=class_name(name),
+        )
+    description = f"{kind.capitalize()} for mbf-flex on {f'the {map_name} map' if map_name else 'every map'}"
+    return _fill(
+        "mbf_abstract", "commands/templates/pyproject.toml.txt", name, entry_point=entry_point, description=description
+    )
+
+
+def _place(template: str, map_name: str) -> tuple[str, str]:
+    """Package and path of a template: of a map's own package, or of those for every map."""
+    return (
+        (_servers_package(map_name), f"templates/{template}") if map_name else ("mbf_abstract", f"{ANY_MAP}/{template}")
+    )
+
+
+def _servers() -> dict[str, str]:
+    """Top-level package of each installed map server."""
+    return {point.name: point.module.partition(".")[0] for point in entry_points(group="mbf.servers")}
+
+
+def _servers_package(map_name: str) -> str:
+    servers = _servers()
     if map_name not in servers:
         raise ValueError(f"no map {map_name!r} is installed; known: {', '.join(sorted(servers))}")
-    return servers[map_name].partition(".")[0]
+    return servers[map_name]
 
 
-def _fill(package: str, path: str, kind: str, name: str, map_name: str) -> str:
+def _maps_with(template: str) -> list[str]:
+    """Names of the maps whose package has a template, one for each package."""
+    names: dict[str, str] = {}
+    for name, package in sorted(_servers().items()):
+        if files(package).joinpath("templates", template).is_file():
+            names.setdefault(package, name)
+    return list(names.values())
+
+
+def _fill(package: str, path: str, name: str, **values: str) -> str:
     """Fill in a template that is data of ``package``."""
     source = files(package).joinpath(path)
     if not source.is_file():
         raise ValueError(f"package {package} has no template {path}")
-    return Template(source.read_text(encoding="utf-8")).substitute(
-        name=name,
-        class_name=class_name(name),
-        kind=kind,
-        map=map_name,
-        group=GROUPS[kind].format(map=map_name),
-    )
+    return Template(source.read_text(encoding="utf-8")).substitute(name=name, class_name=class_name(name), **values)

@@ -66,7 +66,9 @@ def run(
     ),
     wall_clock: bool = typer.Option(False, "--wall-clock", help="Real time instead of as fast as possible."),
     executive: str = typer.Option(
-        "move_base", "--executive", help="Who decides: move_base, classic, or a tree (see mbf tree list)."
+        "move_base",
+        "--executive",
+        help="Who decides: move_base, classic, a tree (see mbf tree list), or module:function.",
     ),
     view: bool = typer.Option(False, "--view", help="Serve a page to watch and steer the run, until Ctrl-C."),
     view_port: int = typer.Option(8080, "--view-port", min=1, max=65535, help="Port of the page; the next free one."),

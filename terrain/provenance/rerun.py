@@ -54,8 +54,8 @@ def rerun(folder: Path, options: RunOptions) -> Repetition:
     if provenance.clock == "real":
         expected = "simulated: real time (--wall-clock) gives another drive each time"
         raise ConfigError([Finding(str(folder / FILE), 1, "clock", expected, provenance.clock)])
-    if provenance.executive not in EXECUTIVES:
-        expected = f"one of {', '.join(EXECUTIVES)}: what somebody outside has driven cannot be repeated"
+    if provenance.executive not in EXECUTIVES and ":" not in provenance.executive:
+        expected = f"one of {', '.join(EXECUTIVES)}, or a tree: what somebody outside has driven cannot be repeated"
         raise ConfigError([Finding(str(folder / FILE), 1, "executive", expected, repr(provenance.executive))])
     if options.folder.resolve() == folder.resolve():
         raise ConfigError([Finding(str(folder), 1, "", "another folder for the repetition", "the same one")])

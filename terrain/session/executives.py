@@ -1,21 +1,24 @@
 """Executives of a run: the ``move_base`` action, a reference behaviour tree, the classic state machine.
 
 All of them block the thread that calls ``drive`` until the goal has ended and can be canceled from any other thread.
-``make_executive`` finds one by the name that ``mbf run --executive`` takes.
+``make_executive`` finds one by what ``mbf run --executive`` takes: a name, or ``module:function`` of a tree.
 """
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
+from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Sequence
 
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.drive.robot import RobotStateError
-from mbf_abstract.executives.reference_trees import READY_TREES, TreeOptions, planning_tree
+from mbf_abstract.event_values import error_text
+from mbf_abstract.executives.reference_trees import READY_TREES, TreeOptions, control_tree, planning_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive, TreeResult
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import MoveBaseGoal, MoveBaseResult
@@ -26,6 +29,8 @@ from mbf_abstract.plugins import PluginKind
 from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase, ClassicSettings
 
 EXECUTIVES = ("move_base", "classic", *READY_TREES)
+TreeMaker: TypeAlias = Callable[[TreeOptions], Behaviour]
+"""Makes a tree that drives to one goal, with the plugins of the robot."""
 
 
 class OneDrive(Protocol):
@@ -66,14 +71,40 @@ class GoalExecutive:
 
 
 def make_executive(executive: str, navigator: Navigator) -> GoalExecutive:
-    """Make the executive of a name in ``EXECUTIVES``; raises ConfigError for another one."""
+    """Make the executive of a name in ``EXECUTIVES``, or of a tree's ``module:function``; ConfigError for another one.
+
+    The function is a ``TreeMaker``.
+    """
     if executive == "move_base":
         return GoalExecutive(partial(MoveBaseDrive, navigator))
     if executive == "classic":
         return GoalExecutive(partial(ClassicMoveBase, navigator, ClassicSettings()))
     if executive in READY_TREES:
-        return GoalExecutive(partial(TreeDrive, navigator, executive), arrives=executive != "planning")
-    raise ConfigError([Finding("--executive", 1, "", f"one of {', '.join(EXECUTIVES)}", repr(executive))])
+        make_tree = _plan_then_control if executive == "control" else READY_TREES[executive]
+        return GoalExecutive(partial(TreeDrive, navigator, make_tree), arrives=executive != "planning")
+    if ":" in executive:
+        return GoalExecutive(partial(TreeDrive, navigator, _tree_of(executive)))
+    expected = f"one of {', '.join(EXECUTIVES)}, or module:function of a tree"
+    raise ConfigError([Finding("--executive", 1, "", expected, repr(executive))])
+
+
+def _plan_then_control(options: TreeOptions) -> Behaviour:
+    """The tree ``control`` follows a path it is given, so planning goes before it."""
+    children = [planning_tree(options), control_tree(options)]
+    return Sequence("plan, then drive", memory=True, children=children)
+
+
+def _tree_of(target: str) -> TreeMaker:
+    """Import the function ``module:function`` that makes a tree."""
+    module, _, name = target.partition(":")
+    try:
+        make_tree = getattr(importlib.import_module(module), name)
+    except (Exception, SystemExit) as error:  # the module is somebody else's
+        found = f"{target}: {type(error).__name__}: {error_text(error)}"
+        raise ConfigError([Finding("--executive", 1, "", "module:function of a tree", found)]) from error
+    if not callable(make_tree):
+        raise ConfigError([Finding("--executive", 1, "", "a function that makes a tree", f"{target}: {make_tree!r}")])
+    return make_tree  # type: ignore[no-any-return]
 
 
 class MoveBaseDrive:
@@ -99,18 +130,11 @@ class MoveBaseDrive:
 
 
 class TreeDrive:
-    """A reference behaviour tree, with those of its recoveries that the server has loaded.
+    """A behaviour tree, with those of its recoveries that the server has loaded."""
 
-    The tree ``control`` follows a path it is given, so ``planning`` goes before it; ``planning`` alone only plans.
-    """
-
-    def __init__(self, navigator: Navigator, name: str, planner: str, controller: str) -> None:
+    def __init__(self, navigator: Navigator, make_tree: TreeMaker, planner: str, controller: str) -> None:
         self._navigator = navigator
-        options = self._options(planner, controller)
-        tree = READY_TREES[name](options)
-        if name == "control":
-            tree = Sequence("plan, then drive", memory=True, children=[planning_tree(options), tree])
-        self._executive = TreeExecutive(tree, navigator)
+        self._executive = TreeExecutive(make_tree(self._options(planner, controller)), navigator)
 
     def run(self, goal: Pose) -> MoveBaseResult:
         """Tick the tree until it ends."""

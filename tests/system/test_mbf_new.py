@@ -11,23 +11,28 @@ import pytest
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
+from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.config.registry import PluginRegistry
+from terrain.session.executives import make_executive
+from terrain.session.session import Session, SessionOptions
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 INSTALL = ("install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation")
-KINDS = ("planner", "controller", "recovery", "layer")
+ON_A_MAP = ("planner", "controller", "recovery", "layer")
+ON_EVERY_MAP = ("controller", "recovery", "executive")
 
 
 def mbf(*arguments):
     return CliRunner().invoke(make_app(), [str(argument) for argument in arguments])
 
 
-@pytest.mark.parametrize("map_name", ["mesh", "costmap"])
-def test_the_tests_of_new_packages_pass(map_name, tmp_path):
-    names = [f"fresh_{map_name}_{kind}" for kind in KINDS]
-    for kind, name in zip(KINDS, names, strict=True):
-        written = mbf("new", kind, name, "--map", map_name, "--out", tmp_path)
-        assert written.exit_code == 0, written.output
+def test_the_tests_of_new_packages_pass(tmp_path):
+    names = []
+    for map_name, kinds in {"mesh": ON_A_MAP, "costmap": ON_A_MAP, "": ON_EVERY_MAP}.items():
+        for kind in kinds:
+            names.append(f"fresh_{map_name or 'any'}_{kind}")
+            written = mbf("new", kind, names[-1], *(["--map", map_name] if map_name else []), "--out", tmp_path)
+            assert written.exit_code == 0, written.output
 
     paths = [str(REPOSITORY), *(str(tmp_path / name) for name in names)]
     command = [
@@ -95,6 +100,28 @@ def test_the_entry_point_leads_to_the_class(tmp_path, monkeypatch):
     assert loaded.__name__ == "MyPlanner"
 
 
+def test_without_a_map_the_type_has_no_prefix_and_is_found_on_every_backend(tmp_path):
+    mbf("new", "controller", "carrot", "--out", tmp_path)
+
+    project = (tmp_path / "carrot" / "pyproject.toml").read_text()
+
+    assert '[project.entry-points."mbf.controllers"]\n"carrot" = "carrot:Carrot"' in project
+    assert 'description = "Controller for mbf-flex on every map"' in project
+
+
+def test_a_new_executive_drives_a_scenario_and_one_that_is_none_is_named(tmp_path, monkeypatch):
+    mbf("new", "executive", "my_executive", "--out", tmp_path)
+    monkeypatch.syspath_prepend(tmp_path / "my_executive")
+
+    with Session("indoor", SessionOptions(backend="costmap")) as session:
+        executive = make_executive("my_executive:make_tree", session.navigator)
+        result = executive.drive(session.navigator.ground_pose(3.0, 3.0))
+        assert result.success, result
+        with pytest.raises(ConfigError, match=r"module 'my_executive' has no attribute 'make_three'"):
+            make_executive("my_executive:make_three", session.navigator)
+    assert "entry-points" not in (tmp_path / "my_executive" / "pyproject.toml").read_text()
+
+
 def test_the_layers_go_to_the_group_of_their_map(tmp_path):
     mbf("new", "layer", "wet", "--map", "costmap", "--out", tmp_path)
 
@@ -104,7 +131,13 @@ def test_the_layers_go_to_the_group_of_their_map(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("refiner", "x", "--map", "mesh"), "no kind 'refiner'; known: planner, controller, recovery, layer"),
+        (
+            ("refiner", "x", "--map", "mesh"),
+            "no kind 'refiner'; known: planner, controller, recovery, layer, executive",
+        ),
+        (("planner", "x"), "a planner needs a map: --map costmap or --map mesh"),
+        (("layer", "x"), "a layer needs a map: --map costmap or --map mesh"),
+        (("executive", "x", "--map", "mesh"), "an executive runs on every map: leave out --map mesh"),
         (("planner", "x", "--map", "octomap"), "no map 'octomap' is installed; known: costmap, mesh"),
         (("planner", "2fast", "--map", "mesh"), "'2fast' is no name for a module"),
         (("planner", "class", "--map", "mesh"), "'class' is no name for a module"),
