@@ -9,53 +9,92 @@ from typing import Any, get_args
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic.fields import FieldInfo
 
+from mbf_abstract.commands.starters import listing
 from mbf_abstract.config.configuration import PluginDeclaration
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 
-INTRODUCTION = """\
+MARK = "<!-- Written by docs/generate_reference.py from the parameter models; do not edit. -->"
+INTRODUCTION = f"""\
 # Configuration
 
-<!-- Written by docs/generate_reference.py from the parameter models; do not edit. -->
+{MARK}
 
-A configuration is one YAML file. `backend` chooses the server. Navigation parameters stand at the top level. The lists
-`planners`, `controllers`, `recovery_behaviors` and `refiners` name plugins; each plugin's parameters stand in a block
-of its name. The map has a section of its own, with a list of layers and a block for each layer.
+A robot has one configuration, a YAML file. Start from one that passes `mbf check`:
 
-`mbf check FILE` reports every mistake at once. *While running* says whether a change takes effect on goals that run
-already; otherwise it is read when a goal starts or when the server is made. A default of **required** must be given.
-Range brackets: `[` includes the bound, `(` does not.
+```sh
+mbf config                                                          # the list below
+mbf config costmap_differential --map office.yaml --out robot.yaml  # writes one, for your map
+mbf check robot.yaml                                                # every mistake at once, with its line
+```
 
-What can change while running is changed by a call, all values of it or none: `server.set_parameters(...)`,
+{{starters}}
+`backend` chooses the server, and with it the map. Navigation parameters stand at the top level. The lists `planners`,
+`controllers`, `recovery_behaviors` and `refiners` name plugins; the parameters of a plugin stand in a block of its
+name. The map has a section of its own, with a list of layers and a block for each layer.
+
+| page | what is on it |
+|---|---|
+| this page | parameters of navigation, and plugins that run on every map |
+| [Costmap server](configuration_costmap.md) | `backend: costmap`: its maps, layers and plugins |
+| [Mesh and tiles servers](configuration_mesh.md) | `backend: mesh`, `backend: tiles`: their maps, layers and plugins |
+
+In the tables, a default of **required** must be given. Of a range, `[` includes the bound and `(` does not. *While
+running* says whether a change takes effect on goals that run already; otherwise it is read when a goal starts or when
+the server is made.
+
+Change values while the server runs by a call, all of its values or none: `server.set_parameters(...)`,
 `server.set_plugin_parameters(kind, name, ...)`, and on every map `set_map_parameters("local_costmap", max_age=1.0)`,
 `set_layer_parameters("global_costmap.inflation", inflation_radius=0.8)` and `set_footprint(...)` with corners or the
 radius of a round robot (on a mesh: a radius). The map shows it after its next update.
 """
 
-SERVERS = ("costmap", "mesh", "tiles")
-TITLES = {
+BACKENDS = {
+    "costmap": ("Configuration of the costmap server", "costmap_layers", ("costmap",)),
+    "mesh": ("Configuration of the mesh and tiles servers", "mesh_layers", ("mesh", "tiles")),
+}
+"""Page -> its title, the group of its layers, and the servers on it."""
+KINDS = {
     "planners": "Planners",
     "controllers": "Controllers",
     "recoveries": "Recovery behaviours",
     "refiners": "Refiners",
-    "costmap_layers": "Costmap layers",
-    "mesh_layers": "Mesh layers",
 }
 
 
-def configuration_page() -> str:
-    """Return the text of ``configuration.md``."""
-    parts = [INTRODUCTION, "## Navigation\n", *_core()]
+def configuration_pages() -> dict[str, str]:
+    """Return the names and texts of the pages: one for what all maps have, one for each kind of map."""
     registry = PluginRegistry()
-    for name in SERVERS:
-        parts += _server(registry.load("servers", name, AbstractNavigationServer))
     ours = [entry for entry in registry.entries() if _is_ours(entry.target)]
-    for group, title in TITLES.items():
-        parts.append(f"## {title}\n")
-        parts += [_plugin(entry.name, registry.load(group, entry.name)) for entry in ours if entry.group == group]
-    return "\n".join(parts)
+
+    def plugins(prefixes: tuple[str, ...], groups: dict[str, str]) -> list[str]:
+        """Headings and tables of the plugins whose names have one of the prefixes."""
+        parts = []
+        for group, title in groups.items():
+            chosen = [one for one in ours if one.group == group and one.name.rpartition(".")[0] in prefixes]
+            if chosen:
+                parts.append(f"## {title}\n")
+                parts += [_plugin(one.name, registry.load(group, one.name)) for one in chosen]
+        return parts
+
+    first = INTRODUCTION.replace("{starters}", starters_table())
+    pages = {"configuration.md": [first, "## Navigation\n", *_core(), *plugins(("",), KINDS)]}
+    for page, (title, layers, servers) in BACKENDS.items():
+        parts = [f"# {title}\n\n{MARK}\n\nNavigation parameters, and plugins that run on every map, are on [the first "]
+        parts[0] += "page](configuration.md), which also says how to read the tables.\n"
+        for name in servers:
+            parts += _server(registry.load("servers", name, AbstractNavigationServer))
+        parts += plugins(servers, {layers: "Layers", **KINDS})
+        pages[f"configuration_{page}.md"] = parts
+    return {name: "\n".join(parts) for name, parts in pages.items()}
+
+
+def starters_table() -> str:
+    """Return a table of the configurations to start from."""
+    lines = [line.partition(" ") for line in listing().splitlines()]
+    return "| starter | for |\n|---|---|\n" + "".join(f"| `{name}` | {text.strip()} |\n" for name, _, text in lines)
 
 
 def _is_ours(target: str) -> bool:

@@ -1,4 +1,4 @@
-"""The command line ``mbf``: plan on a map, check a configuration, list plugins; other packages add commands.
+"""The command line ``mbf``: plan on a map, write and check configurations, list plugins; other packages add commands.
 
 A package adds commands by an entry point of the group ``mbf.commands`` whose function takes the typer application, as
 ``terrain`` does with ``mbf run``. Every command imports what it needs when it is called, so that ``mbf --help`` is
@@ -13,7 +13,7 @@ from importlib.metadata import EntryPoint, entry_points, version
 
 import typer
 
-from mbf_abstract.commands import check, doctor, new, plan, plugins
+from mbf_abstract.commands import check, doctor, new, plan, plugins, starters
 from mbf_abstract.commands.command_group import CommandGroup
 from mbf_abstract.config.installed_plugins import DISTRIBUTION
 
@@ -31,7 +31,7 @@ def make_app() -> typer.Typer:
         rich_markup_mode=None,  # plain text: markup would take a unit such as [m] for its own, and rich costs 0.1 s
     )
     app.callback()(_options)
-    for command in (plan, check, plugins, new, doctor):
+    for command in (plan, check, starters, plugins, new, doctor):
         command.register(app)
     for point in sorted(entry_points(group=COMMANDS_GROUP), key=lambda point: point.name):
         _add_commands(app, point)

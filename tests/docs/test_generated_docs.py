@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from mbf_abstract.config.registry import PluginRegistry
 from terrain.recording.metrics import Metrics
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -23,9 +24,21 @@ def test_no_generated_file_is_out_of_date(generated):
 
 
 def test_every_parameter_has_a_sentence_and_every_plugin_a_summary(generated):
-    page = generated[DOCS / "configuration.md"]
+    page = "\n".join(text for file, text in generated.items() if file.name.startswith("configuration"))
+    assert page.count("\n### `") > 50
     assert not re.findall(r"^\|.*\|\s*\|$", page, re.MULTILINE), "a parameter without a sentence"
     assert not re.findall(r"^### .*\n\n\n", page, re.MULTILINE), "a plugin without a text"
+
+
+def test_every_plugin_stands_on_one_page_of_the_configuration(generated):
+    pages = {file.stem: text for file, text in generated.items() if file.name.startswith("configuration")}
+    ours = [entry.name for entry in PluginRegistry().entries() if entry.target.startswith("mbf_")]
+    stands_on = {name: [page for page, text in pages.items() if f"### `{name}`" in text] for name in ours}
+    assert {name: on for name, on in stands_on.items() if len(on) != 1 and "." in name} == {}
+    assert stands_on["costmap.dwa"] == ["configuration_costmap"] and stands_on["tiles.hierarchical"] == [
+        "configuration_mesh"
+    ]
+    assert max(len(text.splitlines()) for text in pages.values()) < 600
 
 
 def test_the_fault_table_has_a_row_for_every_file(generated):
