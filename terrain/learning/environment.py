@@ -24,12 +24,12 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.parameters import ParameterModel
-from terrain.experiments.evaluation import indoor, outdoor
+from terrain.experiments.evaluation import indoor, moving, outdoor
 from terrain.learning.command_range import CommandRange
 from terrain.learning.episode import Ending, Episode
 from terrain.learning.observation import Observation, ObservationParameters
 from terrain.learning.reward import RewardParts, RewardWeights, StepFacts
-from terrain.learning.worlds import Worlds, bench_indoor, bench_outdoor, one_world
+from terrain.learning.worlds import Worlds, bench_indoor, bench_moving, bench_outdoor, one_world
 from terrain.scenarios.scenario import Scenario
 from terrain.session.simulation_session import SessionOptions
 from terrain.urdf_robots.robot_choice import spec_of
@@ -194,6 +194,13 @@ def of_bench_indoor(levels: Sequence[int] = range(indoor.LEVELS), **arguments: A
 def of_bench_outdoor(levels: Sequence[int] = range(outdoor.LEVELS), **arguments: Any) -> NavigationEnvironment:
     """Make the environment over the generated terrains of ``mbf bench outdoor``, likewise."""
     return NavigationEnvironment(bench_outdoor(levels), **arguments)
+
+
+def of_bench_moving(
+    levels: Sequence[int] = range(moving.LEVELS), people: str = moving.PARTS[0], **arguments: Any
+) -> NavigationEnvironment:
+    """Make the environment over the halls of ``mbf bench moving``, among people who yield or blind ones, likewise."""
+    return NavigationEnvironment(bench_moving(levels, people), **arguments)
 
 
 def _model(model: type[Model], values: Model | Values) -> Model:

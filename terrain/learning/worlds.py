@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from mbf_abstract.config.findings import ConfigError, Finding
-from terrain.experiments.evaluation import indoor, outdoor
+from terrain.experiments.evaluation import indoor, moving, outdoor
 from terrain.scenarios.scenario import Scenario, load_scenario
+from terrain.worlds.occupancy import read_occupancy
 
 Worlds = Callable[[int], tuple[Scenario, int]]
 """Scenario and seed of its run, for a seed of the environment."""
@@ -46,6 +47,24 @@ def bench_outdoor(levels: Sequence[int] = range(outdoor.LEVELS)) -> Worlds:
     """Return the generated terrains of ``mbf bench outdoor``, counted likewise."""
     _check(levels, outdoor.LEVELS)
     return lambda seed: (outdoor.generated(levels[seed % len(levels)]), seed // len(levels))
+
+
+def bench_moving(levels: Sequence[int] = range(moving.LEVELS), people: str = moving.PARTS[0]) -> Worlds:
+    """Return the halls of ``mbf bench moving``, counted likewise; ``people`` are "yielding" or "blind" ones.
+
+    Raises
+    ------
+    ValueError
+        As for ``bench_indoor``, or there are no such people.
+    """
+    _check(levels, moving.LEVELS)
+    if people not in moving.PARTS:
+        raise ValueError(f"people: expected one of {', '.join(moving.PARTS)}, got {people!r}")
+    grid = read_occupancy(moving.HALL)
+    return lambda seed: (
+        moving.hall(levels[seed % len(levels)], seed // len(levels), people, grid),
+        seed // len(levels),
+    )
 
 
 def _check(levels: Sequence[int], count: int) -> None:

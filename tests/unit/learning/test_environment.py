@@ -7,7 +7,7 @@ import pytest
 
 from mbf_abstract.config.findings import ConfigError
 from terrain.experiments.evaluation.outdoor import CONFIGS as OUTDOOR
-from terrain.learning.worlds import bench_indoor, bench_outdoor
+from terrain.learning.worlds import bench_indoor, bench_moving, bench_outdoor
 from terrain.recording.metrics import measure
 from terrain.scenarios.faults import SensorFault
 from terrain.scenarios.limits import Limits
@@ -115,6 +115,24 @@ def test_vectorised_environments_drive_as_single_ones(make_environment):
         for mode in seen:
             for alone, together in zip(observations, seen[mode], strict=True):
                 assert all(np.array_equal(alone[name], together[name][number]) for name in alone)
+
+
+@pytest.mark.parametrize("people", ["yielding", "blind"])
+def test_the_moving_evaluation_is_an_environment_in_whose_scans_people_walk(people):
+    import terrain.learning.ids  # noqa: F401 - registers them
+
+    environment = gymnasium.make("mbf/bench_moving-v1", levels=[9], people=people)
+    first, info = environment.reset(seed=3)
+    scans = [first["scan"], *(environment.step([0.0, 0.0])[0]["scan"] for _ in range(10))]
+    environment.close()
+
+    assert info["world_seed"] == 3 and environment.action_space.shape == (2,)
+    assert np.ptp(np.stack(scans), axis=0).max() > 0.2, "the robot stands, people walk by 0.7 m"
+
+
+def test_people_that_there_are_not_are_refused():
+    with pytest.raises(ValueError, match="people: expected one of yielding, blind, got 'angry'"):
+        bench_moving(people="angry")
 
 
 def test_every_shipped_scenario_with_one_robot_has_an_id():
