@@ -137,3 +137,9 @@ def outcome_name(outcome: int) -> str:
             except ValueError:
                 break
     return f"unknown outcome code {outcome}"
+
+
+def outcome_text(outcome: int, message: str) -> str:
+    """Return name and message of an outcome in one line; the name alone where the message says no more."""
+    name = outcome_name(outcome)
+    return name if message in ("", name) else f"{name}: {message}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
+from mbf_abstract.outcomes import outcome_text
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from terrain.session.goal_sequence import GoalSequence
 from terrain.viewer.live.log import Snapshot
@@ -39,7 +40,7 @@ def headline_html(time: float, sequence: GoalSequence) -> str:
         text = _coloured(f"going to {x:.1f}, {y:.1f}, {z:.1f}", BUSY)
     elif sequence.last_result is not None:
         result = sequence.last_result
-        text = _coloured(f"{result.outcome_name}: {result.message}", GOOD if result.success else BAD)
+        text = _coloured(outcome_text(result.outcome, result.message), GOOD if result.success else BAD)
     else:
         text = _coloured("not started yet", NEITHER)
     return f'<div style="{SMALL};font-weight:600">{time:.0f} s · {text}</div>'

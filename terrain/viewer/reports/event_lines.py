@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbf_abstract.events import Event, EventKind
-from mbf_abstract.outcomes import is_success, outcome_name
+from mbf_abstract.outcomes import is_success, outcome_name, outcome_text
 from terrain.viewer.pictures.colours import BAD, GOOD, NEITHER, WARNING
 
 NOTABLE = {
@@ -65,9 +65,8 @@ def line_of(event: Event) -> Line:
     if event.kind is EventKind.GOAL_FINISHED:
         outcome = event.data.get("outcome")
         code = outcome if isinstance(outcome, int) else 0
-        name = outcome_name(code)
-        colour = NEITHER if name == "CANCELED" else GOOD if is_success(code) else BAD
-        return Line(event.time, event.source, f"{name}: {event.data.get('message', '')}", colour)
+        colour = NEITHER if outcome_name(code) == "CANCELED" else GOOD if is_success(code) else BAD
+        return Line(event.time, event.source, outcome_text(code, str(event.data.get("message", ""))), colour)
     what = "" if event.kind in (EventKind.CUSTOM, EventKind.INCIDENT) else event.kind.value.replace("_", " ")
     text = " ".join(part for part in (what, event_text(event)) if part)
     return Line(event.time, event.source, text, colour_of(event))

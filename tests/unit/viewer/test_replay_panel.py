@@ -50,6 +50,15 @@ def test_the_page_carries_each_run_of_a_tree_and_its_changes_with_their_times():
     assert (second["time"], second["changes"]) == (5.0, [])
 
 
+def test_a_result_without_a_message_of_its_own_is_not_said_twice():
+    ends = [{"outcome": 0, "message": "SUCCESS"}, {"outcome": 0, "message": "drove"}, {"outcome": 50, "message": ""}]
+    events = [Event(1.0, EventKind.GOAL_FINISHED, "refine_path", end) for end in ends]
+
+    lines = [line[1] for line in contents(panel_html(events))["lines"]]
+
+    assert lines == ["refine_path SUCCESS", "refine_path SUCCESS: drove", "refine_path FAILURE"]
+
+
 def incident(what, time=1.0):
     data = {"what": what, "x": 20.0, "y": 12.0, "z": 1.0, "robot_speed": 1.2, "moved": "robot"}
     return Event(time, EventKind.INCIDENT, "simulator", data)
