@@ -8,6 +8,7 @@ Each map is updated at its own rate; before every control cycle the local one mu
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal, cast
@@ -119,6 +120,12 @@ class CostmapNavigationServer(MapServer):
         costs[costmap.cells == UNKNOWN] = np.nan
         geometry = costmap.geometry
         return GridView(costs, (geometry.origin_x, geometry.upper_x, geometry.origin_y, geometry.upper_y))
+
+    def layer_costs(self, view: str, x: float, y: float) -> Mapping[str, float]:
+        """The cost of a cell as each layer has left it; that of the last layer is the map's."""
+        costmap = self.local_costmap if view == "local_costmap" else self.global_costmap
+        costs = costmap.costs_after_layers(x, y)
+        return {name: math.nan if cost == UNKNOWN else cost / INSCRIBED for name, cost in costs.items()}
 
     def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
         """An outline, or the radius of a round robot."""

@@ -119,6 +119,13 @@ class MapInterface(PluginHost):
         """Names of what ``map_view`` can show: maps or layers, the one planners see first."""
         return ()
 
+    def layer_costs(self, view: str, x: float, y: float) -> Mapping[str, float]:
+        """Costs at a place [m] of one of ``map_views`` after each of its layers, in their order; for viewers.
+
+        0 free to 1 and above forbidden, nan unknown. Empty off the map, and where the layers are views themselves.
+        """
+        return {}
+
     def map_view(self, name: str = "") -> MapView | None:
         """What the map, or one of ``map_views``, looks like; None if this server has nothing to show."""
         return None

@@ -19,7 +19,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.view import FloorMap, FloorWindow
-from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellBox, Costmap, GridGeometry
+from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.map.cell_window import CellWindow
 from mbf_costmap_nav.map.layer import CostmapLayer
@@ -81,6 +81,7 @@ class LayeredCostmap(SnapshotAnswers):
         self._window = CellWindow(geometry, UNKNOWN if track_unknown_space else FREE, frame_id)
         self._footprint_padding = footprint_padding
         self.last_update: float | None = None
+        self._after_layers: dict[str, CellArray] | None = None  # cells as each layer has left them; None = not kept
         self._unmoved: set[str] = set()  # names of layers whose cells are not those of the window, or of their floor
         for layer in layers:
             layer.match_geometry(geometry)
@@ -133,6 +134,30 @@ class LayeredCostmap(SnapshotAnswers):
             for layer in permanent:
                 layer.update_costs(cells, self.geometry.box)
             return self._window.costmap(cells, self.last_update) if permanent else None
+
+    def costs_after_layers(self, x: float, y: float) -> dict[str, int]:
+        """Cost of the cell at (x, y) [m] as each enabled layer has left it, in their order; empty off the map.
+
+        They are kept from the first call on, so they are there after the next update.
+        """
+        with self._lock:
+            if self._after_layers is None:
+                self._after_layers = {}
+                self._window.recompute_all()
+            column, row = self.geometry.world_to_cell_unbounded(x, y)
+            if not (0 <= column < self.geometry.width and 0 <= row < self.geometry.height):
+                return {}
+            kept = ((layer.name, self._after_layers.get(layer.name)) for layer in self.layers.enabled)
+            return {name: int(cells[row, column]) for name, cells in kept if cells is not None}
+
+    def _keep_cells(self, name: str, cells: CellArray, box: CellBox) -> None:
+        """Note what a layer has made of the cells of ``box``, if somebody asks for it."""
+        if self._after_layers is None:
+            return
+        if name not in self._after_layers or box == self.geometry.box:  # after every change of the grid it is all of it
+            self._after_layers[name] = cells.copy()
+        else:
+            self._after_layers[name][box.slices] = cells[box.slices]
 
     def stale_reason(self, now: float) -> str:
         """Why the map is not current at ``now`` [s]: its age, a layer that raised, a silent sensor; empty if it is."""
@@ -225,6 +250,7 @@ class LayeredCostmap(SnapshotAnswers):
             for layer in self.layers.enabled:
                 with self.layers.computing(layer):
                     layer.update_costs(cells, box)
+                self._keep_cells(layer.name, cells, box)
 
     def _follow(self, robot_pose: Pose) -> None:
         """Move the window so that the robot is in its middle, and the layers with it."""

@@ -1,6 +1,7 @@
 """The values under a visitor's pointer: the place, and the value of each layer of the map there.
 
-Costs of a mesh are those of its vertices, so the nearest vertex answers; costs of a grid are those of its cells.
+Costs of a mesh are those of its vertices, so the nearest vertex answers. Costs of a grid are those of its cells; below
+them stands what the cell was after each layer, in the order in which they write.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from terrain.viewer.live.ground import costs_at
 from terrain.viewer.pictures.colours import cost_colours_up_to
 from terrain.viewer.pictures.plan_picture import cost_colours
 
+INDENT = "\u2003"  # an em space, before the layers of a map
 REFRESH = 10  # frames of the page between two looks at the map
 Row: TypeAlias = tuple[str, str, str]
 """Name, value and colour, for CSS; no colour where there is nothing to colour."""
@@ -57,6 +59,9 @@ class Readout:
             if isinstance(view, GridView):
                 costs, inside = costs_at(view, place[None])
                 yield (name, *(_of_cell(costs[0]) if inside[0] else ("outside", "")))
+                layers = self._navigation.layer_costs(name, float(place[0]), float(place[1])) if inside[0] else {}
+                for layer, cost in layers.items():
+                    yield (f"{INDENT}{layer}", *_of_cell(np.float32(cost)))
             else:
                 yield (name, *_of_vertex(view, self._nearest(view, place)))
 

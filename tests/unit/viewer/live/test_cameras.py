@@ -118,6 +118,9 @@ class TwoViews:
     def map_view(self, name):
         return self.views[name]
 
+    def layer_costs(self, name, x, y):
+        return {"walls": 0.0, "inflation": 0.25} if name == "whole" and x < 2.0 else {}
+
 
 def readout(**views):
     made = Readout(TwoViews(**views))
@@ -132,7 +135,8 @@ def test_the_values_of_cells_are_those_that_the_place_lies_in():
     def at(x):
         return [(name, value) for name, value, _ in values.rows(np.array([x, 0.5, 0.1]))]
 
-    assert at(1.5) == [("place", "1.50, 0.50, 0.10 m"), ("whole", "0.25"), ("near", "outside")]
+    layers = [("\u2003walls", "0.00"), ("\u2003inflation", "0.25")]
+    assert at(1.5) == [("place", "1.50, 0.50, 0.10 m"), ("whole", "0.25"), *layers, ("near", "outside")]
     assert at(2.6)[1:] == [("whole", "forbidden"), ("near", "forbidden")]
     assert at(3.5)[1:] == [("whole", "unknown"), ("near", "outside")]
 
