@@ -129,7 +129,7 @@ class LiveSession:
     def __enter__(self) -> LiveSession:
         session, access = self._session, self._options.access()
         with ExitStack() as exits:
-            channel = VisitorChannel(SCRIPT.read_text("utf-8"))
+            channel = VisitorChannel(SCRIPT.read_text("utf-8"), self._wall)
             title = "mbf " + session.scenario.name
             server = exits.enter_context(page_server(self._options.port, access, title, channel))
             steered = Role.STEER in access.roles.values()

@@ -1,7 +1,9 @@
 """The stick of the page: who holds it, and whether still, by the clock on the wall.
 
-While it is held the visitor's page reports it ten times a second. No report for ``SILENCE`` is a release: a lost
-connection, a page that hangs, a laptop that was closed.
+While it is held the visitor's page reports it ten times a second, each time with the newest heartbeat of the server
+that it has seen. A report is as old as its heartbeat: since then the person may have let go. No report younger than
+``longest_silence`` is a release: a lost connection, a slow one that keeps reports back, a page that hangs, a laptop
+that was closed.
 """
 
 from __future__ import annotations
@@ -15,18 +17,18 @@ from mbf_abstract.geometry import Twist
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.time.clock import Clock
 
-SILENCE = 0.5  # s of wall time
+SILENCE = 0.5  # s of wall time; command_timeout of the configuration where that is shorter
 MAX_SPEED, MAX_TURN = 0.5, 1.0  # m/s, rad/s; of a robot whose configuration has no limits
 FIRST_SHARE = 0.5
 
 
 class Position(NamedTuple):
-    """Where a visitor holds the stick, -1 to 1, and when the page has last reported it [s]."""
+    """Where a visitor holds the stick, -1 to 1, and the heartbeat that the page had seen then, a time [s]."""
 
     visitor: int
     turn: float
     forward: float
-    reported: float
+    beat: float
 
 
 class Stick:
@@ -69,12 +71,20 @@ class Stick:
         position = self._position
         return None if position is None else position.visitor
 
-    def hold(self, visitor: int, turn: float, forward: float) -> bool:
-        """Note where a visitor holds it; False while somebody else does."""
+    @property
+    def longest_silence(self) -> float:
+        """Age [s] of a report at which the stick counts as released."""
+        return min(SILENCE, self._server.runtime.parameters.command_timeout)
+
+    def hold(self, visitor: int, turn: float, forward: float, beat: float) -> str:
+        """Note where a visitor holds it, at a heartbeat [s]; return why it is not taken, empty if it is."""
         if self.holder not in (None, visitor):
-            return False
-        self._position = Position(visitor, turn, forward, self._wall.now())
-        return True
+            return "somebody else holds the stick"
+        age = self._wall.now() - beat
+        if not 0.0 <= age <= self.longest_silence:
+            return f"the connection is too slow to drive: {age:.1f} s there and back"
+        self._position = Position(visitor, turn, forward, beat)
+        return ""
 
     def release(self, visitor: int) -> None:
         """Note that a visitor does not hold it."""
@@ -84,7 +94,7 @@ class Stick:
     def step(self, is_paused: bool) -> None:
         """Drive, or stop; between two steps of the world."""
         position, reason = self._position, "the stick was released"
-        if position is not None and self._wall.now() - position.reported > SILENCE:
+        if position is not None and self._wall.now() - position.beat > self.longest_silence:
             self._position, reason = None, "the page that held the stick is silent"
         elif position is not None and is_paused:
             reason = "paused"

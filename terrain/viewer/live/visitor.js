@@ -3,7 +3,7 @@
 (path) => {
   "use strict";
   if (window.mbfVisitor) window.mbfVisitor.close();
-  const SEND_EVERY = 100; // ms; pointer and stick
+  const SEND_EVERY = 100; // ms; the pointer. The stick is reported at each heartbeat
   const LEAST_DRAG = 8; // pixels; less is a click
   const PAD = 55; // pixels; half the side of the stick's field
   const KEYS = { KeyW: [0, 1], ArrowUp: [0, 1], KeyS: [0, -1], ArrowDown: [0, -1],
@@ -143,6 +143,10 @@
   // ---------------------------------------------------------------------------------------- the stick, a deadman's switch
   // It is held while the pointer is down on its field, or while the space bar is down; letting go in any way stops.
   const held = new Set();
+  // Each report carries the newest heartbeat of the server, so that one that comes late is known by its age. One that
+  // could not be sent at once is left out: the next one is newer.
+  let beat = null;
+  const reportStick = () => { if (beat !== null && socket.bufferedAmount === 0) send({ stick: [...stick, beat] }); };
   let stick = null, pad = null, knob = null, status = null;
   const field = (event) => {
     const box = pad.getBoundingClientRect();
@@ -158,7 +162,7 @@
   const hold = (position) => {
     const before = stick;
     stick = position;
-    if (stick) send({ stick });
+    if (stick) reportStick();
     else if (before) { send({ stick: null }); showStatus(""); }
     const [turn, forward] = stick || [0, 0];
     knob.style.transform = `translate(${-turn * PAD * 0.7}px, ${-forward * PAD * 0.7}px)`;
@@ -213,7 +217,8 @@
     }), false);
     addStick();
   };
-  const shown = { values: showValues, tree: showTree, stick: showStatus, role: (role) => { if (role === "steer" && !steers) steer(); } };
+  const takeBeat = (time) => { beat = time; if (stick) reportStick(); };
+  const shown = { beat: takeBeat, values: showValues, tree: showTree, stick: showStatus, role: (role) => { if (role === "steer" && !steers) steer(); } };
   socket.onmessage = (event) => {
     for (const [kind, content] of Object.entries(JSON.parse(event.data))) shown[kind]?.(content);
   };
@@ -221,7 +226,7 @@
     steers = false;
     if (status) status.textContent = "Connection lost: reload the page";
   };
-  const timer = setInterval(() => { fit(); reportPointer(); if (stick) send({ stick }); }, SEND_EVERY);
+  const timer = setInterval(() => { fit(); reportPointer(); }, SEND_EVERY);
   listen(window, "keydown", (event) => { if (event.code === "Escape" && drag) { swallow(event); endDrag(); } });
   fit();
   window.mbfVisitor = { close: () => { if (stick) letGo(); listening.abort(); clearInterval(timer); socket.close(); root.remove(); } };

@@ -80,10 +80,10 @@ class Visitors:
             facing = None if start == end else last
             self._controls.post(lambda: self._controls.place(first, facing))
 
-    def hold_stick(self, visitor: int, turn: float, forward: float) -> None:
+    def hold_stick(self, visitor: int, turn: float, forward: float, beat: float) -> None:
         """Note where the stick is held."""
-        if not self._stick.hold(visitor, turn, forward):
-            self._channel.send(visitor, "stick", "somebody else holds the stick")
+        if problem := self._stick.hold(visitor, turn, forward, beat):
+            self._channel.send(visitor, "stick", problem)
 
     def release_stick(self, visitor: int) -> None:
         """Note that the stick was released."""

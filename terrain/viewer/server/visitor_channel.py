@@ -4,21 +4,26 @@ viser reports clicks and the values of controls only. A script of ours in the pa
 second WebSocket to the same server, behind the same guard; its address holds a key that only this visitor's script
 knows, so nobody speaks for another one. Every message is a JSON object with one entry, see ``parsed``; whatever else
 comes is dropped.
+
+A steering script gets a heartbeat: the time of the server's clock, ten times a second. It sends the newest one back
+with every position of the stick, so that a report that a slow connection has kept back is known by its age.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
-import math
 import secrets
 from collections.abc import Callable
 from typing import Any, Protocol, TypeAlias
 
 from mbf_abstract.access.page_access import Role
+from mbf_abstract.time.clock import Clock, WallClock
 
 PREFIX = "/visitor/"
 LONGEST = 200  # characters of a message
+LARGEST = 1e12  # of a number; nan and infinity are none
+BEAT = 0.1  # s between two heartbeats
 MAX_REFUSED = 100  # wrong messages after which a visitor is disconnected
 POLICY_VIOLATION = 1008  # WebSocket close code (RFC 6455, 7.4.1)
 STEERING = ("goal", "stick")
@@ -36,8 +41,11 @@ class VisitorActions(Protocol):
     def place_goal(self, visitor: int, start: Place, end: Place) -> None:
         """Place a goal, or a waypoint, at the start of a drag; it faces the end of the drag."""
 
-    def hold_stick(self, visitor: int, turn: float, forward: float) -> None:
-        """Note the position of the stick, both -1 to 1; called ten times a second while it is held."""
+    def hold_stick(self, visitor: int, turn: float, forward: float, beat: float) -> None:
+        """Note the position of the stick, both -1 to 1; called ten times a second while it is held.
+
+        ``beat`` is the newest heartbeat that the page had seen, a time [s] of the channel's clock.
+        """
 
     def release_stick(self, visitor: int) -> None:
         """Note that this visitor has released the stick."""
@@ -56,6 +64,8 @@ class VisitorChannel:
     ----------
     script : str
         Source of a function of JavaScript that takes the path of the visitor's WebSocket; run in every visitor's page.
+    clock : Clock, optional
+        Whose time the heartbeat is; a wall clock if not given.
 
     Attributes
     ----------
@@ -63,9 +73,10 @@ class VisitorChannel:
         Gets what visitors do; to be set before visitors come.
     """
 
-    def __init__(self, script: str) -> None:
+    def __init__(self, script: str, clock: Clock | None = None) -> None:
         self.actions: VisitorActions | None = None
         self._script = script
+        self._clock = clock or WallClock()
         self._visitors: dict[str, int] = {}  # by key
         self._outboxes: dict[int, _Outbox] = {}
 
@@ -93,13 +104,22 @@ class VisitorChannel:
             return
         outbox = self._outboxes[visitor] = _Outbox(asyncio.get_running_loop())
         self.send(visitor, "role", role.value)
-        sending = asyncio.create_task(outbox.empty_into(connection))
+        tasks = [asyncio.create_task(outbox.empty_into(connection))]
+        if role is Role.STEER:
+            tasks.append(asyncio.create_task(self._beat(visitor)))
         try:
             await _take_all(connection, role, visitor, actions)
         finally:
-            sending.cancel()
+            for task in tasks:
+                task.cancel()
             del self._outboxes[visitor]
             actions.leave(visitor)
+
+    async def _beat(self, visitor: int) -> None:
+        """Send the heartbeat; one that the connection has not taken yet is replaced by the next."""
+        while True:
+            self.send(visitor, "beat", self._clock.now())
+            await asyncio.sleep(BEAT)
 
     def _welcome(self, client: Any) -> None:
         from viser._messages import RunJavascriptMessage
@@ -170,8 +190,8 @@ Action: TypeAlias = Callable[[VisitorActions, int], None]
 def parsed(message: bytes | str, role: Role) -> Action | None:
     """Return what a message asks for, None where it is wrong or not for this role.
 
-    ``{"point": [u, v]}`` or ``{"point": null}``, ``{"goal": [[u, v], [u, v]]}``, ``{"stick": [turn, forward]}`` or
-    ``{"stick": null}``, ``{"look": "follow"}``.
+    ``{"point": [u, v]}`` or ``{"point": null}``, ``{"goal": [[u, v], [u, v]]}``, ``{"look": "follow"}``,
+    ``{"stick": [turn, forward, beat]}`` or ``{"stick": null}``.
     """
     if not isinstance(message, str) or len(message) > LONGEST:
         return None
@@ -206,8 +226,10 @@ def _goal(value: Any) -> Action | None:
 def _stick(value: Any) -> Action | None:
     if value is None:
         return lambda actions, visitor: actions.release_stick(visitor)
-    stick = _pair(value, -1.0, 1.0)
-    return None if stick is None else lambda actions, visitor: actions.hold_stick(visitor, *stick)
+    if not isinstance(value, list) or len(value) != 3 or not _is_number(value[2]):
+        return None
+    stick, beat = _pair(value[:2], -1.0, 1.0), float(value[2])
+    return None if stick is None else lambda actions, visitor: actions.hold_stick(visitor, *stick, beat)
 
 
 def _look(value: Any) -> Action | None:
@@ -223,8 +245,13 @@ def _pair(value: Any, low: float, high: float) -> Place | None:
     """Two numbers between ``low`` and ``high``; None for anything else."""
     if not isinstance(value, list) or len(value) != 2:
         return None
-    if any(isinstance(one, bool) or not isinstance(one, int | float) for one in value):
-        return None
-    if not all(low <= one <= high and math.isfinite(one) for one in value):
+    if not all(_is_number(one) and low <= one <= high for one in value):
         return None
     return float(value[0]), float(value[1])
+
+
+def _is_number(value: Any) -> bool:
+    """Whether it is a finite number that a float can hold."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= LARGEST

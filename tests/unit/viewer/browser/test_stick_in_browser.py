@@ -24,7 +24,7 @@ class Noted:
         self.looks = 0
         self.changes = []
 
-    def hold_stick(self, visitor, turn, forward):
+    def hold_stick(self, visitor, turn, forward, beat):
         if self.changes[-1:] != ["held"]:
             self.changes.append("held")
 

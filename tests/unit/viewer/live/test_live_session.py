@@ -79,7 +79,7 @@ def test_a_stick_that_is_held_when_the_run_ends_is_let_go(meadow):
     with Session(meadow) as session:
         sequence = GoalSequence(session, make_executive("move_base", session.navigator), stay=True)
         with LiveSession(session, sequence, ViewOptions(port=18230, speed=0.0)) as live:
-            session.loop.on_tick.insert(0, lambda time: live._stick.hold(1, 0.5, 0.0))
+            session.loop.on_tick.insert(0, lambda time: live._stick.hold(1, 0.5, 0.0, live._wall.now()))
             session.loop.on_tick.append(lambda time: sequence.end("done") if time > 2.0 else None)
             sequence.visit_goals()
         reasons = [event.data.get("reason") for event in session.memory.of_kind(EventKind.CUSTOM)]

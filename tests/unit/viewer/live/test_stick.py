@@ -19,10 +19,15 @@ def by_hand(request, steered):
     return run, stick
 
 
-def hold(run, stick, begin, end, turn=0.0, forward=1.0, visitor=1):
+def report(run, stick, visitor=1, turn=0.0, forward=1.0, delay=0.0):
+    """What a page reports that has seen the heartbeat of ``delay`` s ago."""
+    return stick.hold(visitor, turn, forward, run.session.clock.now() - delay)
+
+
+def hold(run, stick, begin, end, turn=0.0, forward=1.0, visitor=1, delay=0.0):
     """Report it as a page does, ten times a second."""
     for tenth in range(round(10 * begin), round(10 * end)):
-        run.at(0.1 * tenth, lambda: stick.hold(visitor, turn, forward))
+        run.at(0.1 * tenth, lambda: report(run, stick, visitor, turn, forward, delay))
 
 
 def log(run):
@@ -46,7 +51,9 @@ def test_who_takes_the_stick_cancels_the_goal_and_the_robot_stands_afterwards(by
 @pytest.mark.parametrize("by_hand", ["move_base", "navigation"], indirect=True)
 def test_a_goal_that_was_asked_for_just_before_does_not_drive_the_robot_when_the_stick_is_released(by_hand):
     run, stick = by_hand
-    run.at(2.0, lambda: run.controls.go_to_pose(Pose.planar(9.0, 8.0)), lambda: stick.hold(1, 0.5, 0.0))
+    run.at(
+        2.0, lambda: run.controls.go_to_pose(Pose.planar(9.0, 8.0)), lambda: report(run, stick, turn=0.5, forward=0.0)
+    )
     hold(run, stick, 2.1, 3.0, turn=0.5)
     run.at(3.0, lambda: stick.release(1))
     run.at(6.0, lambda: run.controls.end("enough"))
@@ -91,13 +98,32 @@ def test_the_second_visitor_gets_the_stick_when_the_first_one_has_released_it(by
     run, stick = by_hand
     answers = []
     hold(run, stick, 2.0, 3.0)
-    run.at(2.5, lambda: answers.append(stick.hold(2, 0.0, -1.0)), lambda: stick.release(2))
-    run.at(3.0, lambda: stick.release(1), lambda: answers.append(stick.hold(2, 0.0, -1.0)))
+    run.at(2.5, lambda: answers.append(report(run, stick, 2)), lambda: stick.release(2))
+    run.at(3.0, lambda: stick.release(1), lambda: answers.append(report(run, stick, 2)))
     run.at(3.2, lambda: run.controls.end("enough"))
 
     run.visit_goals()
 
-    assert answers == [False, True]
+    assert answers == ["somebody else holds the stick", ""]
+
+
+def test_over_a_slow_connection_the_robot_stops_when_the_last_report_is_too_old_however_late_it_comes(by_hand):
+    run, stick = by_hand
+    timeout = 0.3
+    run.session.navigator.server.set_parameters(command_timeout=timeout)
+    hold(run, stick, 2.0, 3.0, delay=0.2)  # the last heartbeat that was seen is that of 2.7 s
+    answers = []
+    for tenth in range(35, 45):  # reports that the connection has kept back, all of them in a burst
+        run.at(0.1 * tenth, lambda: answers.append(stick.hold(1, 0.0, 1.0, 2.8)))
+    run.at(5.0, lambda: run.controls.end("enough"))
+
+    run.visit_goals()
+
+    (ended,) = [e.time for e in run.events(EventKind.CUSTOM) if e.data["what"] == "end of teleoperation"]
+    assert ended - 2.7 == pytest.approx(timeout, abs=0.1)
+    assert run.poses[2.1].distance_to(run.poses[2.9]) > 0.1
+    assert run.poses[3.5].distance_to(run.poses[5.0]) < 0.01
+    assert len(answers) == 10 and all("too slow to drive" in answer for answer in answers)
 
 
 def test_a_paused_robot_does_not_follow_the_stick(by_hand):

@@ -11,6 +11,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from mbf_abstract.access.page_access import PageAccess, Role
+from mbf_abstract.time.clock import WallClock
 from terrain.viewer.server.page_server import page_server
 from terrain.viewer.server.visitor_channel import MAX_REFUSED, PREFIX, VisitorChannel, parsed
 
@@ -19,7 +20,7 @@ RIGHT = [
     ({"point": [0.25, 1]}, ("point", 7, (0.25, 1.0))),
     ({"point": None}, ("point", 7, None)),
     ({"goal": [[0, 0], [0.5, 1.0]]}, ("place_goal", 7, (0.0, 0.0), (0.5, 1.0))),
-    ({"stick": [-1, 0.5]}, ("hold_stick", 7, -1.0, 0.5)),
+    ({"stick": [-1, 0.5, 12.25]}, ("hold_stick", 7, -1.0, 0.5, 12.25)),
     ({"stick": None}, ("release_stick", 7)),
     ({"look": "follow"}, ("look", 7, "follow")),
 ]
@@ -57,7 +58,9 @@ def test_what_the_script_sends_arrives_and_from_watchers_only_what_steers_nothin
         '{"point": [1e999, 0]}',
         {"point": [0.5]}, {"point": [0.5, 1.01]}, {"point": [True, 0.5]}, {"point": ["0", 0]}, {"point": "null"},
         {"goal": None}, {"goal": [[0, 0]]}, {"goal": [[0, 0], None]}, {"goal": [0, 0]}, {"goal": [[0, 0], [0, 2]]},
-        {"stick": [2, 0]}, {"stick": [0, -1.1]}, {"stick": [0, 0, 0]}, {"stick": "up"}, {"stick": [[], {}]},
+        {"stick": [2, 0, 1]}, {"stick": [0, -1.1, 1]}, {"stick": [0, 0]}, {"stick": [0, 0, 0, 0]}, {"stick": "up"},
+        {"stick": [[], {}, 1]}, {"stick": [0, 0, None]}, {"stick": [0, 0, True]}, '{"stick": [0, 0, NaN]}',
+        '{"stick": [0, 0, 1e999]}', {"stick": [0, 0, 2**70]},
         {"look": "away"}, {"look": None}, {"look": ["follow"]}, {"drive": [0, 0]}, {"": None},
         {"point": None, "look": "follow"}, {"look": "follow" + " " * 200},
     ],
@@ -86,8 +89,8 @@ def test_whatever_comes_nothing_is_raised_and_only_right_values_arrive():
 class Served:
     """A page with a channel, and a visitor of viser's whose key is known."""
 
-    def __init__(self, server, access, channel):
-        self.access, self.channel, self.port = access, channel, server.get_port()
+    def __init__(self, server, access, channel, clock):
+        self.access, self.channel, self.clock, self.port = access, channel, clock, server.get_port()
         self.actions = channel.actions = Noted()
         self._client = type("Client", (), {"client_id": 7, "_websock_connection": self})()
         channel._welcome(self._client)
@@ -111,23 +114,28 @@ class Served:
 
 @pytest.fixture(scope="module")
 def served():
-    access, channel = PageAccess.by_token(), VisitorChannel("(path) => {}")
+    access, clock = PageAccess.by_token(), WallClock()
+    channel = VisitorChannel("(path) => {}", clock)
     with page_server(PORT, access, channel=channel) as server:
-        yield Served(server, access, channel)
+        yield Served(server, access, channel, clock)
 
 
 def test_a_visitor_learns_the_role_acts_gets_answers_and_is_forgotten(served):
     async def visit():
         async with served.socket(served.key) as socket:
             role = json.loads(await socket.recv())
-            await socket.send('{"stick": [0.5, 1]}')
-            await served.until(lambda: ("hold_stick", 7, 0.5, 1.0) in served.actions.calls)
+            beats = [json.loads(await socket.recv())["beat"] for _ in range(3)]
+            assert beats == sorted(set(beats)) and 0.0 <= served.clock.now() - beats[-1] < 20.0
+            await socket.send(json.dumps({"stick": [0.5, 1, beats[-1]]}))
+            await served.until(lambda: ("hold_stick", 7, 0.5, 1.0, beats[-1]) in served.actions.calls)
             served.channel.send(7, "stick", "driving")
             served.channel.send(8, "stick", "to nobody")
             async with served.socket(served.key) as second:
                 with pytest.raises(ConnectionClosed):
                     await second.recv()
-            return role, json.loads(await socket.recv())
+            while "stick" not in (answer := json.loads(await socket.recv())):
+                pass
+            return role, answer
 
     role, answer = asyncio.run(visit())
     assert role == {"role": "steer"} and answer == {"stick": "driving"}
@@ -139,7 +147,7 @@ def test_a_watcher_cannot_hold_the_stick(served):
     async def visit():
         async with served.socket(served.key, Role.WATCH) as socket:
             role = json.loads(await socket.recv())
-            for message in ('{"stick": [0, 1]}', '{"goal": [[0, 0], [0, 0]]}', '{"look": "overview"}'):
+            for message in ('{"stick": [0, 1, 1]}', '{"goal": [[0, 0], [0, 0]]}', '{"look": "overview"}'):
                 await socket.send(message)
             await served.until(lambda: ("look", 7, "overview") in served.actions.calls)
             return role
