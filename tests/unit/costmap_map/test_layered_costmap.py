@@ -378,3 +378,23 @@ def test_clearing_everything_returns_to_the_static_map(build, seeing):
 def test_clearing_an_unknown_layer_names_the_known_ones(build):
     with pytest.raises(KeyError, match="no layer 'laser', only"):
         build("static").clear(["laser"])
+
+
+# ------------------------------------------------------------------------------------------- costs layer by layer
+def test_costs_after_each_layer_are_those_of_the_map_with_the_layers_up_to_it():
+    seeing = {"footprint_clearing_enabled": False, "sources": {"laser": {"expected_update_rate": 0.0}}}
+    watched, parts = with_windows(seeing), [with_windows(seeing) for _ in LAYERS]
+    for part, last in zip(parts, range(len(LAYERS)), strict=True):
+        for name in LAYERS[last + 1 :]:
+            part.set_layer_parameters(name, part.usual_parameters(name).model_copy(update={"enabled": False}))
+    assert watched.costs_after_layers(5.0, 5.0) == {}, "they are kept from the first question on"
+    for time, place in ((0.1, (6.5, 5.5)), (0.2, (4.5, 7.5))):
+        for one in (watched, *parts):
+            one.insert_points("laser", [(*place, 0.0)], (10.0, 7.0, 0.0), time)
+            one.update(HERE, time)
+
+    for y in np.arange(0.5, 15.0):
+        for x in np.arange(0.5, 20.0):
+            wanted = [int(part.snapshot().cells[int(y), int(x)]) for part in parts]
+            assert watched.costs_after_layers(x, y) == dict(zip(LAYERS, wanted, strict=True))
+    assert watched.costs_after_layers(25.0, 5.0) == {}
