@@ -29,6 +29,7 @@ from mbf_abstract.server.plugin_host import ServerError
 from mbf_mesh_nav.files.mesh_io import known_endings, read_mesh, require_packages
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.robot_outline import changes_of_radius
 from mbf_mesh_nav.mesh.ground import ground_heights
 from mbf_mesh_nav.mesh.mesh_report import SHOWN_INDICES
 from mbf_mesh_nav.motion.vector_field import VectorField
@@ -92,9 +93,7 @@ class MeshNavigationServer(MapServer):
 
     def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
         """The radius of the disc that stands for the robot; inflation layers have radii of their own."""
-        if not isinstance(footprint, int | float):
-            raise ValueError(f"a mesh map takes the robot for a disc: a radius [m], not {footprint!r}")
-        return {"inscribed_radius": footprint, "footprint": ()}
+        return changes_of_radius(footprint)
 
     def swap_mesh(self, mesh_file: Path | str) -> None:
         """Drive on another mesh from now on, e.g. after the lift; its layers are those of the configuration.

@@ -29,10 +29,10 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent
-from mbf_mesh_nav.kernels.mesh.vectors import Vector
 from mbf_mesh_nav.kernels.motion.mppi import score_rollouts
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.mesh.positions import vector_of
 from mbf_mesh_nav.motion.goal_approach import (
     GoalApproach,
     braking_speed,
@@ -281,8 +281,8 @@ class MPPIController(SurfaceFollower):
             snapshot.costs,
             self._ranks_at(snapshot),
             spot.face,
-            _vector(spot.point),
-            tangent(_vector(pose.rotation[:, 0]), _vector(mesh_map.face_normals[spot.face])),
+            vector_of(spot.point),
+            tangent(vector_of(pose.rotation[:, 0]), vector_of(mesh_map.face_normals[spot.face])),
             motions,
             p.model_dt / pieces,
             ahead,
@@ -363,7 +363,3 @@ class MPPIController(SurfaceFollower):
         if self.parameters.motion_model == "differential":
             return Twist.planar(vx=speed, wz=turn)
         return AckermannCommand(speed, clamp(turn, self._steering_limit))
-
-
-def _vector(array: FloatArray) -> Vector:
-    return float(array[0]), float(array[1]), float(array[2])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from pydantic import field_validator
 
@@ -35,6 +37,13 @@ class OutlineParameters(ParameterModel):
         if (np.min(corners, axis=0) >= 0.0).any() or (np.max(corners, axis=0) <= 0.0).any():
             raise ValueError("corners on all sides of the robot's origin (0, 0)")
         return corners
+
+
+def changes_of_radius(footprint: object) -> dict[str, Any]:
+    """Changes of these parameters for a disc of a radius [m]; ValueError for anything but a number."""
+    if not isinstance(footprint, int | float):
+        raise ValueError(f"a mesh map takes the robot for a disc: a radius [m], not {footprint!r}")
+    return {"inscribed_radius": footprint, "footprint": ()}
 
 
 class OutlinedMap(LayeredMap):

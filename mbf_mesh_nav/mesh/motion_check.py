@@ -17,6 +17,7 @@ from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned, walk
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter, rank_at
 from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.mesh.positions import position_text, vector_of
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
 SURFACE_DISTANCE = 1.0
@@ -49,16 +50,13 @@ def forbidden_ahead(
     radius : float
         How far [m] the robot reaches beyond its centre.
     """
-    face, point = place.face, (float(place.point[0]), float(place.point[1]), float(place.point[2]))
+    face, point = place.face, vector_of(place.point)
     stands_on = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
     if command.speed == 0.0:
         blocked = command.wz != 0.0 and stands_on >= LETHAL_RANK
-        return f"the robot stands on an obstacle at {_text(point)}" if blocked else ""
+        return f"the robot stands on an obstacle at {position_text(point)}" if blocked else ""
     ahead = pose.rotation[:, 0] * command.vx + pose.rotation[:, 1] * command.vy
-    normal = mesh.face_normals[face]
-    direction = tangent(
-        (float(ahead[0]), float(ahead[1]), float(ahead[2])), (float(normal[0]), float(normal[1]), float(normal[2]))
-    )
+    direction = tangent(vector_of(ahead), vector_of(mesh.face_normals[face]))
     on_arc, total, walked = command.speed * duration, command.speed * duration + radius, 0.0
     while walked < total:
         stride = min(STRIDE, total - walked)
@@ -66,15 +64,13 @@ def forbidden_ahead(
             mesh.vertices, mesh.faces, mesh.face_neighbours, mesh.face_normals, face, point, direction, stride
         )
         if done < stride - 1e-6:
-            return f"the surface ends at {_text(point)}"
+            return f"the surface ends at {position_text(point)}"
         comes_to = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
         if not may_enter(stands_on, comes_to):
-            return f"an obstacle is in the way: the robot would touch it at {_text(point)}"
+            return f"an obstacle is in the way: the robot would touch it at {position_text(point)}"
         stands_on, walked = comes_to, walked + stride
         if command.wz != 0.0 and walked < on_arc:
-            normal = mesh.face_normals[face]
-            up = (float(normal[0]), float(normal[1]), float(normal[2]))
-            direction = turned(direction, up, command.wz * stride / command.speed)
+            direction = turned(direction, vector_of(mesh.face_normals[face]), command.wz * stride / command.speed)
     return ""
 
 
@@ -93,7 +89,3 @@ def nearest_of(
     nearest = int(np.argmin(distances))
     x, y, z = offsets[nearest].tolist()
     return (x, y, z) if distances[nearest] <= within else None
-
-
-def _text(point: tuple[float, float, float]) -> str:
-    return f"({point[0]:.2f}, {point[1]:.2f}, {point[2]:.2f})"

@@ -91,8 +91,3 @@ def describe_blockage(mesh_map: MeshMap, snapshot: MeshSnapshot, vertex: int, co
     names = [name for name, layer in mesh_map.layers.items() if layer.lethal[vertex]]
     layers = f" (lethal in layer {', '.join(names)})" if names else ""
     return f"cost {snapshot.costs[vertex]:.3g}, limit {cost_limit:g}{layers}"
-
-
-def position_text(position: FloatArray | tuple[float, float, float]) -> str:
-    """Write a position for a message, in metres."""
-    return f"({position[0]:.2f}, {position[1]:.2f}, {position[2]:.2f})"

@@ -16,9 +16,9 @@ from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.geometry.arithmetic import arctan2, norm
 from mbf_mesh_nav.arrays import Float32Array
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned
-from mbf_mesh_nav.kernels.mesh.vectors import Vector
 from mbf_mesh_nav.kernels.motion.outline_sweep import sweep
 from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.mesh.positions import vector_of
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
 SPACING = 0.05
@@ -66,8 +66,8 @@ def swept_obstacle(
     seconds = turn / abs(command.wz) / steps
     course = math.atan2(command.vy, command.vx) if command.speed > 0.0 else 0.0
     outline = np.column_stack([arctan2(points[:, 1], points[:, 0]) - course, distances])
-    point, normal = _vector(place.point), _vector(mesh.face_normals[place.face])
-    ahead = turned(tangent(_vector(pose.rotation[:, 0]), normal), normal, course)
+    point, normal = vector_of(place.point), vector_of(mesh.face_normals[place.face])
+    ahead = turned(tangent(vector_of(pose.rotation[:, 0]), normal), normal, course)
     surface = mesh.vertices, mesh.faces, mesh.face_neighbours, mesh.face_normals
     step = command.speed * seconds, command.wz * seconds, steps
     touched, (x, y, z) = sweep(*surface, ranks, place.face, point, ahead, outline, *step)
@@ -82,7 +82,3 @@ def points_on(corners: Sequence[Sequence[float]]) -> FloatArray:
     return np.concatenate(
         [end + np.arange(count)[:, None] / count * side for end, side, count in zip(ends, sides, counts, strict=True)]
     )
-
-
-def _vector(array: FloatArray) -> Vector:
-    return float(array[0]), float(array[1]), float(array[2])

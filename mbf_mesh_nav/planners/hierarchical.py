@@ -24,7 +24,8 @@ from mbf_mesh_nav.arrays import FlagArray
 from mbf_mesh_nav.mesh.borders import on_surface
 from mbf_mesh_nav.mesh.ground import heights_text
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner, position_text
+from mbf_mesh_nav.mesh.positions import position_text
+from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner
 from mbf_mesh_nav.mesh.topology import group_of_each
 from mbf_mesh_nav.search.leg_search import Leg
 from mbf_mesh_nav.search.surface_planner import failure_of_leg, named_poses, path_of_legs

@@ -29,7 +29,7 @@ from mbf_abstract.plugins import RefineResult
 from mbf_abstract.time.cancel import CancelToken
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.kernels.motion.path_poses import poses_along
-from mbf_mesh_nav.mesh.surface_point import position_text
+from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.plugins import MeshRefiner
 from mbf_mesh_nav.search.corridor import Corridor, Piece
 from mbf_mesh_nav.search.surface_planner import SAME_POINT

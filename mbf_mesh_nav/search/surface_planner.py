@@ -27,7 +27,8 @@ from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.borders import on_surface
 from mbf_mesh_nav.mesh.ground import ground_heights, heights_text
 from mbf_mesh_nav.mesh.locate import SurfacePoint
-from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner, position_text, surface_point_at_vertex
+from mbf_mesh_nav.mesh.positions import position_text
+from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner, surface_point_at_vertex
 from mbf_mesh_nav.plugins import MeshContext, MeshPlanner
 from mbf_mesh_nav.search.blocked_vertices import BlockedVertices
 from mbf_mesh_nav.search.leg_search import Leg, LegQuery, propagate_from

@@ -22,7 +22,7 @@ import numpy as np
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, follow_predecessors, propagate_distances
-from mbf_mesh_nav.mesh.surface_point import position_text
+from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.tiles.places import TilePlace
 from mbf_mesh_nav.tiles.portals import PortalGraph, costs_to_portals
 from mbf_mesh_nav.tiles.tile import TileKey

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_mesh_nav.arrays import FlagArray
-from mbf_mesh_nav.mesh.surface_point import position_text
+from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.tiles.corridor_search import CorridorSearch, TiledPlan, failed_plan
 from mbf_mesh_nav.tiles.places import TilePlace
 from mbf_mesh_nav.tiles.portals import NOT_CANCELLED

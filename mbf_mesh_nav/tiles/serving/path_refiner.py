@@ -18,7 +18,7 @@ from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import AbstractRefiner, RefineResult
 from mbf_abstract.time.cancel import CancelToken
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.mesh.surface_point import position_text
+from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.plugins import MeshRefiner
 from mbf_mesh_nav.tiles.serving.moment import Moment
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap

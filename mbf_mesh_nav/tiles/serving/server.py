@@ -30,7 +30,7 @@ from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.server.plugin_host import ServerError
 from mbf_mesh_nav.map.map_builder import MeshLayerEntry
 from mbf_mesh_nav.map.mesh_map import MeshMap
-from mbf_mesh_nav.map.robot_outline import OutlineParameters
+from mbf_mesh_nav.map.robot_outline import OutlineParameters, changes_of_radius
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.plugins import MeshController, MeshPlugin, MeshRecovery, MeshRefiner
 from mbf_mesh_nav.tiles.index import is_tile_folder, read_index
@@ -157,9 +157,7 @@ class TileServer(MapServer):
 
     def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
         """The radius of the disc that stands for the robot; the map's layers keep theirs."""
-        if not isinstance(footprint, int | float):
-            raise ValueError(f"a mesh map takes the robot for a disc: a radius [m], not {footprint!r}")
-        return {"inscribed_radius": footprint, "footprint": ()}
+        return changes_of_radius(footprint)
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add the map."""
