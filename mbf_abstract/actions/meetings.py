@@ -1,4 +1,4 @@
-"""What a robot does that is blocked where it meets others: which behaviour it runs, and from which distance they meet.
+"""Which recovery a blocked robot runs where it meets other robots, and how near their paths come when they meet.
 
 Nobody has to configure it. A robot that announces its path and has loaded a recovery named ``give_way`` runs that one,
 at the distance that ``give_way`` keeps. ``right_of_way_behavior`` names another one or none.

@@ -1,4 +1,4 @@
-"""Finds a robot that gets nowhere: the same failure at the same place, again and again, whatever is tried against it.
+"""Detects a stuck robot: the same failure at the same place, again and again, whatever recovery is tried.
 
 An executive notes every failure it recovers from and every behaviour it has run. Where failures of one kind have come
 ``stuck_failures`` times within ``stuck_distance`` of a place, and go on after ``stuck_time``, the robot is stuck there:

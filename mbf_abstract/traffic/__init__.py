@@ -1,1 +1,1 @@
-"""What robots that run this navigation announce to each other, and who of two goes first."""
+"""What robots that run this navigation announce to each other, and which of two goes first."""

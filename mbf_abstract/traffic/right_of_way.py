@@ -1,4 +1,4 @@
-"""Who of two robots goes first where only one can, by a rule that both compute from what they have announced.
+"""Which of two robots goes first where only one can pass, by a rule that both compute from their announcements.
 
 First goes the one that cannot yield; of two that can, or two that cannot, the one that has waited in vain less often;
 of two that have waited equally often, the one with the shorter path to its goal; of two equally long paths, that of the

@@ -1,4 +1,4 @@
-"""Give way: drive off the path that the robot came along and would go on, to where another one can pass, and wait.
+"""Give way: leave the path to where another robot can pass, and wait.
 
 When to use: as ``right_of_way_behavior``; in ``escalation_behaviors``, against whoever stands head on in a corridor or
 a door and waits for us. When not: things that never move; plan around those. Give two robots of the same kind different

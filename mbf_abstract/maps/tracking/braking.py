@@ -1,4 +1,4 @@
-"""How a robot moves from a command until it stands, for the check of contacts.
+"""How a robot moves from a command until it has stopped, for the check of contacts.
 
 A robot has the command for a reaction time, then it brakes. How fast it takes up a command is not known, so three
 motions are checked:

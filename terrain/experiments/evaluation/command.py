@@ -161,5 +161,5 @@ def _asked(context: typer.Context) -> Asked:
     chosen = settings_of(given["settings"], planner=given["planner"], controller=given["controller"])
     if not chosen and not given["beside"]:
         raise typer.BadParameter("nothing to judge: give --planner, --controller, --set or --beside")
-    shared = (given[name] for name in ("backend", "name", "beside", "workers", "time_limit", "as_json"))
-    return Asked(chosen, *shared, Path(given["out"]), command_line(context))
+    shared = {name: given[name] for name in ("backend", "name", "beside", "workers", "time_limit", "as_json")}
+    return Asked(chosen, **shared, out=Path(given["out"]), command=command_line(context))
