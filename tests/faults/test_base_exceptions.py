@@ -9,9 +9,9 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_abstract.testing.faulty import Hang, drive
-from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import ThreadDetached, WallClock
+from tests.promises import assert_ended_once, assert_next_goals_work, assert_stops
 
 ERRORS = [SystemExit(3), asyncio.CancelledError("no"), KeyboardInterrupt(), GeneratorExit(), ThreadDetached("liar")]
 

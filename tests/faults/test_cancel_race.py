@@ -9,10 +9,10 @@ from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
 from mbf_abstract.plugins import PlanResult, RecoveryResult
 from mbf_abstract.testing.faulty import obedient, slow
-from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
 from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.sim_clock import SimClock
+from tests.promises import assert_ended_once, assert_next_goals_work
 
 GOAL = Pose.planar(3.0, 0.0)
 

@@ -2,10 +2,10 @@
 
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.testing.faulty import drive
-from mbf_abstract.testing.promises import assert_ended_once, assert_stops
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
+from tests.promises import assert_ended_once, assert_stops
 
 
 def test_the_clocks_never_run_backwards():

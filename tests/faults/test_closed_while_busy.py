@@ -9,10 +9,10 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.testing.faulty import BusyHang, Hang
-from mbf_abstract.testing.promises import assert_ended_once
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
+from tests.promises import assert_ended_once
 
 GOALS = {
     "planner": lambda session: GetPathGoal(Pose.planar(3.0, 0.0)),

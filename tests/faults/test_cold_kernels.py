@@ -10,11 +10,11 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.testing.faulty import BusyHang, drive
-from mbf_abstract.testing.promises import assert_ended_once, assert_stops
 from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
+from tests.promises import assert_ended_once, assert_stops
 
 assert kernel_cache  # a map backend imports it with its kernels
 

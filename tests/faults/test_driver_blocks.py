@@ -8,10 +8,10 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import RecoveryResult
-from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
+from tests.promises import assert_ended_once, assert_next_goals_work, assert_stops
 
 PLACES = {
     "odometry": "the robot's odometry()",

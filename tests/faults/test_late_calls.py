@@ -9,11 +9,11 @@ from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing.faulty import BusyHang, Hang, drive, obedient
-from mbf_abstract.testing.promises import assert_next_goals_work
 from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
 from mbf_abstract.testing.scripted_session import SCRIPTED, ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
+from tests.promises import assert_next_goals_work
 
 GOAL = GetPathGoal(Pose.planar(3.0, 0.0))
 

@@ -11,12 +11,12 @@ from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Path
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.testing.faulty import drive
-from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_costmap_nav.files.map_description import MapError
 from mbf_costmap_nav.files.map_io import load_image, load_map
 from mbf_mesh_nav.files.mesh_io import read_mesh
 from mbf_mesh_nav.mesh.repair import MeshError
+from tests.promises import assert_ended_once, assert_next_goals_work
 
 SMALL = 4_000_000  # bytes; far below every input that is claimed here
 POSES = 100_000

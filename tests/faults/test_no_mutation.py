@@ -18,13 +18,13 @@ from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.testing.promises import assert_next_goals_work, assert_stops
 from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.plugins import CostmapPlanner
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.plugins import MeshPlanner
+from tests.promises import assert_next_goals_work, assert_stops
 
 CONFIGS = {
     "mesh": """

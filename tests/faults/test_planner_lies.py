@@ -10,9 +10,9 @@ from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome, is_success
 from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing import faulty
-from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
 from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
+from tests.promises import assert_ended_once, assert_next_goals_work
 
 
 def outcome(code, message="found"):

@@ -10,8 +10,8 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
 from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.testing.faulty import Hang
-from mbf_abstract.testing.promises import assert_ended_once
 from mbf_abstract.testing.scripted_session import ScriptedSession
+from tests.promises import assert_ended_once
 
 
 def start_plan_and_stop():

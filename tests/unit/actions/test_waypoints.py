@@ -10,11 +10,11 @@ from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult
 from mbf_abstract.testing.faulty import BusyHang, Hang
-from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
 from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
+from tests.promises import assert_ended_once, assert_next_goals_work
 
 NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")
 NEAR = (Pose.planar(0.3, 0.0), Pose.planar(0.6, 0.0), Pose.planar(0.9, 0.0))

@@ -9,10 +9,10 @@ from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.plugins import RefineResult
 from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.testing.promises import assert_stops
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.sim_clock import SimClock
+from tests.promises import assert_stops
 
 
 @pytest.fixture

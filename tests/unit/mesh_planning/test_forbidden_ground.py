@@ -52,6 +52,9 @@ class Robot:
     def pose(self):
         return Pose.planar(self.x, self.y, self.yaw)
 
+    def velocity(self):
+        return Twist()
+
     def send(self, command):
         speed = command.speed if isinstance(command, AckermannCommand) else command.vx
         turn = speed * math.tan(command.steering_angle) / 0.5 if isinstance(command, AckermannCommand) else command.wz

@@ -1,4 +1,4 @@
-"""The promises of the framework as checks a test can call: stop (P1), end (P2), stay (P3)."""
+"""The promises of the framework as checks: stop (P1), end (P2), stay (P3)."""
 
 from __future__ import annotations
 
