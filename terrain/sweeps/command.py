@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from mbf_abstract.commands.reporting import readable_errors
 from terrain.commands.command_line import command_line
 from terrain.commands.completion import SCENARIO
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from terrain.sweeps.sweep import SweepRun
 
 
 def register(app: typer.Typer) -> None:
@@ -46,14 +53,11 @@ def sweep(
         from rich.progress import track
 
         from mbf_abstract.event_values import well_formed
-        from terrain.commands.verdict_line import TERMINAL_COLOURS
-        from terrain.recording.verdict import Level
         from terrain.scenarios.scenario import load_scenario
         from terrain.sweeps.cluster import run_on_cluster
         from terrain.sweeps.log import SweepLog
         from terrain.sweeps.report import write_tables
         from terrain.sweeps.sweep import hash_of, is_done, plan_sweep, run_once
-        from terrain.sweeps.terminal_tables import comparison_table, letters_of, summary_table
         from terrain.sweeps.worker_pool import run_in_workers
 
         loaded = load_scenario(scenario)
@@ -74,18 +78,33 @@ def sweep(
                 finished, escape(well_formed(loaded.name)), len(left), console=console, disable=not console.is_terminal
             ):
                 log.append(run.key(hashed), {**metrics, "seed": run.seed, "variant": run.variant})
-                text = well_formed(f"seed {run.seed} {run.variant}: {metrics['verdict']}")
-                style = TERMINAL_COLOURS[Level(metrics["level"])]
-                console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+                _print_verdict(console, run, metrics)
             rows = [log.rows[run.key(hashed)] for run in planned]
         files = write_tables(f"{loaded.name}: {loaded.proves}", rows, out)
-        for variant, letter in letters_of(rows).items():
-            console.print(f"{letter}  {well_formed(variant) or 'as written'}", markup=False, highlight=False)
-        console.print(summary_table(rows))
-        if (tests := comparison_table(rows)) is not None:
-            console.print(tests)
+        _print_tables(console, rows)
         names = ", ".join(file.name for file in files)
         console.print(f"results in {out}: {names}", soft_wrap=True, markup=False)
+
+
+def _print_verdict(console: Console, run: SweepRun, metrics: Mapping[str, Any]) -> None:
+    from mbf_abstract.event_values import well_formed
+    from terrain.commands.verdict_line import TERMINAL_COLOURS
+    from terrain.recording.verdict import Level
+
+    text = well_formed(f"seed {run.seed} {run.variant}: {metrics['verdict']}")
+    style = TERMINAL_COLOURS[Level(metrics["level"])]
+    console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
+
+def _print_tables(console: Console, rows: list[dict[str, Any]]) -> None:
+    from mbf_abstract.event_values import well_formed
+    from terrain.sweeps.terminal_tables import comparison_table, letters_of, summary_table
+
+    for variant, letter in letters_of(rows).items():
+        console.print(f"{letter}  {well_formed(variant) or 'as written'}", markup=False, highlight=False)
+    console.print(summary_table(rows))
+    if (tests := comparison_table(rows)) is not None:
+        console.print(tests)
 
 
 def parse_seeds(text: str) -> list[int]:
