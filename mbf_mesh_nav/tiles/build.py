@@ -122,8 +122,7 @@ class TileBuilder:
         # 1. The mesh of core and overlap, and its layers as on any map.
         own = np.arange(len(part.vertices), dtype=np.int32), np.arange(len(part.faces), dtype=np.int32)
         topology = build_topology(CheckedMesh(part.vertices, part.faces, *own, own[0]))
-        mesh_map = MeshMap(topology, self._settings.frame_id)
-        layers = compute_layers(mesh_map, self._plan, "")
+        layers = compute_layers(MeshMap(topology, self._settings.frame_id), self._plan, "")
         # 2. The core comes first, otherwise all keep the order in which neighbours lie close in memory.
         is_core_face = topology.internal_to_input_faces < part.core_faces
         is_core = np.zeros(topology.vertex_count, dtype=np.bool_)
