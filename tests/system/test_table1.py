@@ -8,6 +8,8 @@ import pytest
 from terrain.experiments.table1.conditions import CONDITIONS, without_traffic
 from terrain.experiments.table1.environments.outdoor_environment import OUTDOOR
 from terrain.experiments.table1.environments.world import WAREHOUSE
+from terrain.experiments.table1.main_run import buildings
+from terrain.experiments.table1.main_run.trial import Trial, run_trial, tally_of
 from terrain.experiments.table1.repetition import run_repetition
 
 pytestmark = pytest.mark.timeout(300)  # a leg takes some ten seconds of processor time
@@ -43,3 +45,11 @@ def test_the_experiment_runs_in_another_building():
     run = run_repetition(CONDITIONS["B"], DEPOT, seed=100, legs=1)
     assert run.tally.legs[0].end == "reached"
     assert not run.tally.contacts
+
+
+def test_a_trial_of_the_main_run_drives_in_a_drawn_plan_and_leaves_its_row(monkeypatch):
+    monkeypatch.setattr(buildings, "LEGS", 1)
+    row = run_trial(Trial("plans", 101, "full_tree", None, "hash"))
+    tally = tally_of(row)
+    assert [leg.end for leg in tally.legs] == ["reached"]
+    assert tally.planner_calls["main_ok"] >= 1 and not tally.contacts and "lost" not in row
