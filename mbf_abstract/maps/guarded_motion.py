@@ -81,7 +81,7 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
         motion, as the goal may be paused and the sleep lasts until it is resumed; two refusals in a row do.
         """
         motion, token, limit = request.motion, request.cancel_token, self.parameters.time_limit
-        deadline, refusals = self.clock.now() + limit, 0
+        deadline, refusals, last = self.clock.now() + limit, 0, Twist()
         while not token.cancelled:
             pose = motion.pose()
             if finished(pose):
@@ -94,10 +94,11 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
             if isinstance(answer, RecoveryResult):
                 return answer
             here, measured = self.on_map(pose), motion.velocity()
-            share, reason, _ = self.navigation_map.safe_share(here, measured, answer, self.clock.now())
+            moving = last if measured == Twist() else measured  # a robot without odometry measures none
+            share, reason, _ = self.navigation_map.safe_share(here, moving, answer, self.clock.now())
             if obstacle := reason if share == 0.0 else self.obstacle_ahead(pose, answer):
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, obstacle)
-            refusals = 0 if motion.send(slower(answer, share)) else refusals + 1
+            refusals, last = 0 if motion.send(slower(answer, share)) else refusals + 1, answer
             if refusals > 1 and not token.cancelled:
                 return RecoveryResult(RecoveryOutcome.STOPPED, GATE_REFUSED)
             if not motion.sleep(self.parameters.control_period):

@@ -173,6 +173,21 @@ def test_what_is_safe_is_asked_with_the_velocity_that_was_measured(world, run):
     assert all(command.vx < 0.0 for _, command in asked)
 
 
+class UnmeasuredMotion(RigMotion):
+    """A robot without odometry."""
+
+    def velocity(self):
+        return Twist()
+
+
+def test_a_robot_without_odometry_counts_as_moving_as_it_was_told(world, run):
+    navigation_map, asked = world.map_of(nothing), []
+    navigation_map.safe_share = lambda pose, velocity, command, now: asked.append((velocity, command)) or (1.0, "", 0.0)
+    run("back_up", navigation_map, UnmeasuredMotion)
+    velocities, commands = zip(*asked, strict=True)
+    assert velocities == (Twist(), *commands[:-1])
+
+
 def test_one_drives_no_faster_than_is_safe_among_those_who_move(world, run):
     commands = []
     for share in (1.0, 0.25):
