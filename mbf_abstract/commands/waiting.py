@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -13,6 +14,9 @@ if TYPE_CHECKING:
 @contextmanager
 def waiting(text: str, console: Console | None = None) -> Iterator[Callable[[str], None]]:
     """Show ``text``, and for how long it has been so, while the block runs; yields a function that changes the text."""
+    if console is None and not sys.stderr.isatty():
+        yield lambda news: None  # rich takes 0.1 s to import
+        return
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 

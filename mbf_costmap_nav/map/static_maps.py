@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
@@ -69,4 +68,6 @@ def _clearance(floor_plan: Costmap) -> NDArray[np.float32]:
     lethal = floor_plan.cells == LETHAL
     if not lethal.any():
         return np.full(lethal.shape, np.inf, dtype=np.float32)
+    from scipy import ndimage  # takes 0.13 s to import, and a plan on a bare map does without it
+
     return np.asarray(ndimage.distance_transform_edt(~lethal) * floor_plan.resolution, dtype=np.float32)

@@ -7,7 +7,6 @@ sensor writes: where even that has no path, waiting and trying again are useless
 from __future__ import annotations
 
 import numpy as np
-from scipy import ndimage
 
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
@@ -31,6 +30,8 @@ def is_permanently_unreachable(
     ix, iy = walls.world_to_cell_clamped(start.x, start.y)
     if not free[iy, ix]:
         return False
+    from scipy import ndimage  # takes 0.13 s to import, and most plans are found
+
     pieces, _ = ndimage.label(free, EIGHT_NEIGHBOURS)
     rows, columns = np.nonzero(pieces == pieces[iy, ix])
     goal_x, goal_y = walls.world_to_cell_clamped(goal.x, goal.y)
