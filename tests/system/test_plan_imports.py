@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from importlib.metadata import entry_points
+from pathlib import Path
 
 import pytest
 
@@ -24,6 +25,7 @@ end_header
 3 0 1 2
 3 0 2 3
 """
+OFFICE = Path(__file__).resolve().parents[2] / "terrain" / "data" / "office.yaml"
 LOOK = """
 import sys
 from mbf_abstract.commands.standing_server import read_config_or_map
@@ -40,6 +42,29 @@ def test_a_mesh_needs_no_costmap_server(tmp_path):
     done = subprocess.run(command, check=True, capture_output=True, text=True)
 
     assert done.stdout.split() == ["mbf_abstract", "mbf_mesh_nav"]
+
+
+def test_a_plan_that_nobody_watches_loads_no_progress_bar_and_nothing_that_it_does_not_need():
+    plan = ["plan", str(OFFICE), "--start", "3", "9.7", "--goal", "12", "9.7"]
+    code = (
+        "import sys\n"
+        "from mbf_abstract.cli import make_app\n"
+        f"make_app()({plan}, standalone_mode=False)\n"
+        "print(*sys.modules)"
+    )
+
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+
+    assert "SUCCESS" in done.stdout
+    loaded = {*done.stdout.split("\n")[-2].split()}
+    assert "numba" in loaded and not loaded & {
+        "rich",
+        "scipy.ndimage",
+        "matplotlib",
+        "trimesh",
+        "mbf_mesh_nav",
+        "terrain.physics",
+    }
 
 
 @pytest.mark.parametrize("point", sorted(entry_points(group=MAP_FILES_GROUP), key=lambda point: point.name))
