@@ -62,7 +62,7 @@ def test_a_plan_that_nobody_watches_loads_no_progress_bar_and_nothing_that_it_do
         "scipy.ndimage",
         "matplotlib",
         "trimesh",
-        "mbf_mesh_nav",
+        "mbf_mesh_nav.server",
         "terrain.physics",
     }
 
