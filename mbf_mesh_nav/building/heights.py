@@ -21,7 +21,7 @@ from mbf_mesh_nav.kernels.building.smoothing import ACROSS, bends_of_patches, sm
 
 SETTLINGS = 2
 """Times that slopes and heights are computed from each other."""
-FITTINGS, IMPROBABLE = 2, 2.0
+FITTINGS, IMPROBABLE, IMPROBABLE_AFTER_SMOOTHING = 2, 2.0, 3.0
 """Times that heights are moved towards their points, and the standard errors from which a difference is no chance."""
 MEDIAN_OF_ERRORS = 0.6745
 """Median of the absolute values of normally distributed errors, in standard errors."""
@@ -31,7 +31,9 @@ BAND, STANDING = 6.0, 5.0
 """Where there is more, in standard errors: how thick ground may be, and above which height something stands on it."""
 UNSTEADY = 0.02
 """Standard error [m] of a cell's mean from which heights are smoothed."""
-ROUNDS, FREQUENCIES = 30, 32
+ROUNDS, FREQUENCIES = 60, 32
+LEAST_BENDS = 0.1
+"""Least variance of the ground's bends, in variances of a point: noise hides what is less."""
 BEND_SHARE = 0.362
 """Variance of a bend of a surface of which all bends are weighed as in ``smoothed_heights``, in units of one bend's."""
 
@@ -95,9 +97,10 @@ def settled(patches: SurfacePatches, points: FloatArray, limits: HeightLimits) -
 def smoothed(patches: SurfacePatches, limits: HeightLimits) -> tuple[SurfacePatches, float]:
     """Copy with heights weighed against a smooth surface, and the share of a cell's error that its height keeps.
 
-    The ground's own bends are what the bends of the heights have beyond the noise. Maximum of the posterior
-    probability for independent normal errors and bends (Wahba, "Spline models for observational data", 1990, 1.5); its
-    variance is the mean, over all frequencies, of what the smoothing lets through.
+    The ground's own bends are what the bends of the heights have beyond the noise: their median, as boulders are the
+    business of ``fitted``. Maximum of the posterior probability for independent normal errors and bends (Wahba, "Spline
+    models for observational data", 1990, 1.5). Its variance is the mean, over all frequencies, of what the smoothing
+    lets through; it is stated for all bends, boulders included, which is more.
     """
     counts = (patches.ends - patches.firsts).astype(np.int32)
     usual = float(np.median(counts[patches.is_ground])) if patches.is_ground.any() else 1.0
@@ -107,12 +110,14 @@ def smoothed(patches: SurfacePatches, limits: HeightLimits) -> tuple[SurfacePatc
     bends, variances = bends_of_patches(patches.heights, counts, links)
     if not len(bends):
         return patches, 1.0
-    variance = limits.noise * limits.noise
-    excess = bends * bends - variance * variances
-    ground = max(float(excess.mean()), 0.01 * variance) / BEND_SHARE
-    stiffness = variance / ground
-    heights = smoothed_heights(patches.heights, counts, links, stiffness, ROUNDS)
-    return replace(patches, heights=heights), float(np.sqrt(_kept_variance(stiffness / usual)))
+    variance, least = limits.noise * limits.noise, LEAST_BENDS * limits.noise * limits.noise
+    usual_bend = float(np.median(np.abs(bends))) / MEDIAN_OF_ERRORS
+    of_most, of_all = (
+        max(square - variance * float(variances.mean()), least) / BEND_SHARE
+        for square in (usual_bend * usual_bend, float((bends * bends).mean()))
+    )
+    heights = smoothed_heights(patches.heights, counts, links, variance / of_most, ROUNDS)
+    return replace(patches, heights=heights), float(np.sqrt(_kept_variance(variance / of_all / usual)))
 
 
 def _kept_variance(stiffness: float) -> float:
@@ -126,12 +131,13 @@ def _kept_variance(stiffness: float) -> float:
     return float((1.0 / (1.0 + stiffness * bend)).mean())
 
 
-def fitted(patches: SurfacePatches, points: FloatArray, limits: HeightLimits) -> SurfacePatches:
+def fitted(patches: SurfacePatches, points: FloatArray, limits: HeightLimits, is_smoothed: bool) -> SurfacePatches:
     """Copy whose faces are as near to the ground points as these are exact; see ``fitted_heights``."""
+    improbable = IMPROBABLE_AFTER_SMOOTHING if is_smoothed else IMPROBABLE
     for _ in range(FITTINGS):
         error = noise_of_points(patches, points, limits.thickness, limits.rise)
         arrays = (points, patches.firsts, patches.ends, patches.centres, patches.heights, patches.links(limits.rise))
-        heights = fitted_heights(*arrays, patches.grid.cell, np.array([limits.thickness, IMPROBABLE * error]))
+        heights = fitted_heights(*arrays, patches.grid.cell, np.array([limits.thickness, improbable * error]))
         patches = replace(patches, heights=heights)
     return patches
 

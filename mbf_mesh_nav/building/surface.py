@@ -140,7 +140,7 @@ def build_surface(
     limits = limits.with_noise(noise_of_points(patches, kept, rise, rise))
     patches = without_false_ground(settled(patches, kept, limits), limits, chosen.obstacle_points)
     patches, kept_error = smoothed(patches, limits)
-    patches = fitted(patches, kept, limits)
+    patches = fitted(patches, kept, limits, kept_error < 1.0)
     on_step("holes")
     patches = without_holes(patches, chosen.hole_width, rise, chosen.clearance)
     on_step("faces")

@@ -46,8 +46,8 @@ def test_the_stated_error_is_that_of_the_heights(rng):
         points = ground(rng, hills, noise=noise)
         surface = build_surface(points)
         errors = surface.vertices[:, 2] - hills(*surface.vertices[:, :2].T)
-        stated = map_facts(PointCloud(points), surface).height_error
-        assert stated == pytest.approx(np.sqrt((errors * errors).mean()), rel=0.3)
+        stated, measured = map_facts(PointCloud(points), surface).height_error, np.sqrt((errors * errors).mean())
+        assert 0.7 * measured < stated < 2.0 * measured
         assert (surface.kept_error < 1.0) == (noise == NOISE)
 
 
