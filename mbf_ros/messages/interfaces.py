@@ -64,8 +64,13 @@ class Field:
 @cache
 def _interfaces() -> dict[str, tuple[Field, ...]]:
     """All types by name."""
+    return types_in(files(__package__).joinpath("interfaces.txt").read_text("utf-8"))
+
+
+def types_in(text: str) -> dict[str, tuple[Field, ...]]:
+    """Return the types by name that a text describes: a name on a line, then its fields, indented; # is a comment."""
     types: dict[str, list[Field]] = {}
-    for line in files(__package__).joinpath("interfaces.txt").read_text("utf-8").splitlines():
+    for line in text.splitlines():
         if not line or line.startswith("#"):
             continue
         if not line.startswith(" "):

@@ -2,7 +2,7 @@
 
 Only what rclpy needs is made: messages for Python, and the type support of Fast DDS. That takes less than half the time
 of the packages' usual build, and neither CMake nor ament, whose files in the wheels name folders of the machine that
-made them.
+made them. Headers take most of a compiler's time, so all sources of a kind are compiled together.
 
 Up to Jazzy, Fast DDS also asks for descriptions of types (introspection). Where a package has two type supports,
 ``rosidl_typesupport_c`` loads the library of the one that is asked for by its name. So each has a library of that name,
@@ -11,19 +11,21 @@ which holds nothing and leads to the library of the package; the extension modul
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shutil
 import subprocess
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import cache
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
-from mbf_ros.ros2.interfaces.definitions import interface_files, used_packages
+from mbf_ros.ros2.interfaces.definitions import JAZZY, KILTED, interface_files, used_packages
 
 FAST_DDS, CHOSEN = "rosidl_typesupport_fastrtps_c", "rosidl_typesupport_c"
 INTROSPECTION = "rosidl_typesupport_introspection_c"
@@ -33,6 +35,8 @@ RUNTIME = ("rosidl_runtime_c", CHOSEN, FAST_DDS, INTROSPECTION, "rosidl_typesupp
 OF_A_PACKAGE = ("rosidl_generator_c", CHOSEN, FAST_DDS, INTROSPECTION)
 FOR_PYTHON = "rosidl_generator_py"
 """Libraries of each package that others use; the one for Python only their extension modules."""
+PYTHON = "for_python"
+"""Name of the sources of the extension module."""
 INTERMEDIATE = ("*.c", "*.cpp", "*.h", "*.hpp", "*.o", "*.idl", "detail")
 
 
@@ -56,7 +60,7 @@ def build(package: str, into: Path, on_step: Callable[[str], None] = lambda text
         on_step(f"generating {package}")
         sources = _generate(package, made)
         on_step(f"compiling {package}: {len(sources)} files")
-        _compile(package, made, sources)
+        _compile(package, made, _together(sources, Path(folder)))
         shutil.rmtree(into / package, ignore_errors=True)
         shutil.copytree(made, into / package, ignore=shutil.ignore_patterns(*INTERMEDIATE))
     return into / package
@@ -64,7 +68,12 @@ def build(package: str, into: Path, on_step: Callable[[str], None] = lambda text
 
 def _type_supports() -> list[str]:
     """Names of the type supports that the installed Fast DDS asks for."""
-    return [FAST_DDS, INTROSPECTION] if (_prefix() / "lib" / FAST_DDS_2).exists() else [FAST_DDS]
+    return [FAST_DDS, INTROSPECTION] if _distribution() == JAZZY else [FAST_DDS]
+
+
+def _distribution() -> str:
+    """Which of the distributions whose packages are known is installed."""
+    return JAZZY if (_prefix() / "lib" / FAST_DDS_2).exists() else KILTED
 
 
 def _generate(package: str, made: Path) -> list[Path]:
@@ -91,10 +100,10 @@ def _generate(package: str, made: Path) -> list[Path]:
     ]
     if INTROSPECTION in supports:
         generators.append((GenerateIntrospectionCTypesupport(INTROSPECTION), described))
-    shares = [str(_prefix() / "share" / used) for used in used_packages(package)]
-    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):  # each file is announced
+    shares = [str(_prefix() / "share" / used) for used in used_packages(package, _distribution())]
+    with _muted(), _parsed_once():
         idl = []
-        for name, text in interface_files(package).items():
+        for name, text in interface_files(package, _distribution()).items():
             file = made / name
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text, "utf-8")
@@ -105,6 +114,57 @@ def _generate(package: str, made: Path) -> list[Path]:
     (made / "__init__.py").write_text("", "utf-8")
     files = (file for folder in (made, described) for file in folder.rglob("*"))
     return sorted(file for file in files if file.suffix in (".c", ".cpp"))
+
+
+_MUTE: list[TextIO] = []
+
+
+@contextmanager
+def _muted() -> Iterator[None]:
+    """Print nothing: each file is announced.
+
+    empy 3, which apt installs, puts a proxy before the first ``sys.stdout`` that it meets, and raises where that is
+    gone later. So what it has left is put there again.
+    """
+    before = sys.stdout
+    sys.stdout = _MUTE.pop() if _MUTE else open(os.devnull, "w")
+    try:
+        yield
+    finally:
+        _MUTE.append(sys.stdout)
+        sys.stdout = before
+
+
+@contextmanager
+def _parsed_once() -> Iterator[None]:
+    """Let the generators, each of which parses every file, share what the first one has parsed."""
+    parser: Any = import_module("rosidl_parser.parser")
+    parse = parser.get_ast_from_idl_string
+    parser.get_ast_from_idl_string = cache(parse)
+    try:
+        yield
+    finally:
+        parser.get_ast_from_idl_string = parse
+
+
+def _together(sources: list[Path], folder: Path) -> list[Path]:
+    """Return sources each of which includes all of a kind, and those that cannot share a compilation.
+
+    The kind is what follows the name of the interface, e.g. ``__functions.c``. Descriptions repeat those of the types
+    that they use.
+    """
+    alone, kinds = [], dict[str, list[Path]]()
+    for source in sources:
+        _, separator, kind = source.name.partition("__")
+        if kind == "description.c":
+            alone.append(source)
+        elif separator:
+            kinds.setdefault(f"{source.relative_to(folder).parts[0]}_{kind}", []).append(source)
+        else:
+            kinds.setdefault(f"{PYTHON}{source.suffix}", []).append(source)
+    for name, members in kinds.items():
+        (folder / name).write_text("".join(f'#include "{member}"\n' for member in members), "utf-8")
+    return [*alone, *(folder / name for name in kinds)]
 
 
 def _prefix() -> Path:
@@ -126,7 +186,7 @@ def _compile(package: str, made: Path, sources: list[Path]) -> None:
 
     def compile_one(source: Path) -> str:
         compiler = ["gcc", "-std=c11"] if source.suffix == ".c" else ["g++", "-std=c++17"]
-        target = str(source.with_suffix(".o"))
+        target = f"{source}.o"
         _run([*compiler, *flags, "-c", str(source), "-o", target])
         return target
 
@@ -140,9 +200,9 @@ def _compile(package: str, made: Path, sources: list[Path]) -> None:
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         objects = dict(zip(sources, pool.map(compile_one, sources), strict=True))
-    of_python = [made_of for source, made_of in objects.items() if source.name.startswith("_")]
-    others = [made_of for source, made_of in objects.items() if not source.name.startswith("_")]
-    used = used_packages(package)
+    of_python = [made_of for source, made_of in objects.items() if source.stem == PYTHON]
+    others = [made_of for source, made_of in objects.items() if source.stem != PYTHON]
+    used = used_packages(package, _distribution())
     libraries = installed([*(f"{one}__{kind}" for one in used for kind in OF_A_PACKAGE), *RUNTIME])
     ours = [f"{package}__{CHOSEN}"]
     link(f"lib{ours[0]}.so", others, libraries)

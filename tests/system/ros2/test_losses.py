@@ -6,8 +6,13 @@ from pathlib import Path
 import pytest
 
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
+from tests.system.ros2.conftest import ROBOT
 
 pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+CONFIG = ROBOT.replace("type: keepout}]", "type: keepout}, {name: seen, type: obstacle}]").replace(
+    "area: {zones: []}", "area: {zones: []}, seen: {sources: {scan: {}}}"
+)
+OPTIONS = ("--no-nav2",)
 GOALS = 1000
 GROWTH = 10  # kB a goal: less than a goal with its result takes that is kept
 
@@ -46,6 +51,7 @@ def test_the_robot_stops_when_the_node_is_killed_and_a_new_node_takes_the_next_g
 
 
 def test_a_goal_ends_with_tf_error_when_the_robot_is_killed_and_the_next_one_works(trio):
+    """Of exe_path: that its map is not current any more, either, is no reason to recover and plan again."""
     goal = trio.drive()
     assert trio.client.put("controller_patience", 1.0)["successful"]
     trio.robot.kill()
@@ -58,7 +64,7 @@ def test_a_goal_ends_with_tf_error_when_the_robot_is_killed_and_the_next_one_wor
     assert trio.client.result("move_base", target=[0.5, 0.0])[0] == "succeeded"
 
 
-@pytest.mark.parametrize("topic", ["tf", "odom"])
+@pytest.mark.parametrize("topic", ["tf", "odom", "scan"])
 def test_a_robot_of_which_nothing_is_heard_is_stopped_and_goes_on_when_it_is_heard_again(trio, topic):
     goal = trio.drive()
     before = len(trio.robot.lines)

@@ -15,7 +15,7 @@ CONFIG = ROBOT.replace(LAYERS, "layers: [{name: area, type: keepout}, {name: wal
     "area: {zones: []}", "area: {zones: []}, walls: {map_topic: /map}"
 )
 CONFIG += "planner_max_retries: 0\n"
-OPTIONS = ("--foxglove",)
+OPTIONS = "--foxglove", "--no-nav2"
 REACHED, OFF_THE_MAP, BLOCKED = ("succeeded", 0), ("aborted", 63), ("aborted", 54)
 
 

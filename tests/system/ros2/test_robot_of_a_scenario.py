@@ -1,22 +1,28 @@
-"""Our node drives the robot of a scenario over ROS 2, in lockstep, to a goal that a client sends."""
+"""Our node drives the robot of a scenario over ROS 2, in lockstep, to a goal that a client sends.
 
+Indoors on a costmap, without physics; outdoors on the mesh of real hills, with Bullet.
+"""
+
+import time
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import pytest
+import yaml
 
 import terrain.scenarios.scenario
 from mbf_abstract.outcomes import MoveBaseOutcome
-from tests.system.ros2.conftest import PEERS, Client, Peer
+from tests.system.ros2.conftest import PEERS, WITHIN, Client, Peer
 from tests.system.ros2.environments import free_domain
 
 pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
-CONFIG = Path(terrain.scenarios.scenario.__file__).parent / "library" / "config" / "indoor_costmap.yaml"
-SCENARIO = f"""
+LIBRARY = Path(terrain.scenarios.scenario.__file__).parent / "library"
+INDOOR = f"""
 name: to_the_door
 proves: A robot of ours is driven over ROS 2.
 backend: costmap
-navigation: {{costmap: {CONFIG}}}
+navigation: {{costmap: {LIBRARY}/config/indoor_costmap.yaml}}
 physics: kinematic
 world: {{type: office}}
 robot: turtlebot
@@ -26,28 +32,70 @@ sensors: [{{name: lidar, type: planar, rate: 10.0, rays: 90, max_range: 8.0}}]
 """
 
 
-def test_a_goal_is_reached_with_the_same_outcome_for_its_client_and_for_the_run(ros_folder, tmp_path):
-    scenario, run = tmp_path / "scenario.yaml", tmp_path / "run"
-    scenario.write_text(SCENARIO)
-    with ExitStack() as closing:
-        domain = free_domain(ros_folder.parent, closing)
+def outdoor():
+    """The scenario that ships, on a smaller piece of ground, with a goal two metres from its start."""
+    scenario = yaml.safe_load((LIBRARY / "outdoor.yaml").read_text("utf-8"))
+    scenario["navigation"] = {name: f"{LIBRARY}/{file}" for name, file in scenario["navigation"].items()}
+    scenario["world"]["size"] = 16.0
+    scenario["goals"] = [{"x": 9.4, "y": 9.4, "yaw": 0.8}]
+    return yaml.safe_dump(scenario)
 
-        def start(kind, *arguments):
-            peer = kind(ros_folder, domain, tmp_path, *arguments)
-            closing.callback(peer.end)
-            return peer
 
+class DrivenWorld:
+    """``mbf run SCENARIO --ros2``, our node with the configuration of that run, and a client."""
+
+    def __init__(self, closing, folder, logs, scenario, *sensors):
+        self._closing, self._folder, self._logs = closing, folder, logs
+        self._domain = free_domain(folder.parent, closing)
+        file, run = logs / "scenario.yaml", logs / "run"
+        file.write_text(scenario)
         options = ["--ros2", "--ros2-stamped", "--ros2-lockstep", "--ros2-patience", "300", "--json"]
-        simulator = start(Peer, str(PEERS / "simulator.py"), str(scenario), "--out", str(run), *options)
-        client = start(Client)
-        client.wait(client.do(order="look", topic="/clock"), "seen")  # the configuration is written now
-        sensor, silence = ["--sensor", "scan:LaserScan=lidar"], ["--max-silence", "60"]
-        time = ["--", "-p", "use_sim_time:=true"]
-        node = start(Peer, str(PEERS / "node.py"), str(run / "navigation.yaml"), "--stamped", *sensor, *silence, *time)
+        self.simulator = self._start(Peer, str(PEERS / "simulator.py"), str(file), "--out", str(run), *options)
+        self.client = self._start(Client)
+        self.client.wait(self.client.do(order="look", topic="/clock"), "seen")  # the configuration is written now
+        options = ["--stamped", *sensors, "--max-silence", "60", "--no-nav2", "--", "-p", "use_sim_time:=true"]
+        node = self._start(Peer, str(PEERS / "node.py"), str(run / "navigation.yaml"), *options)
         node.wait_for(lambda line: "is ready" in line.get("text", ""))
-        client.meet()
-        assert client.result("move_base", target=[4.0, 3.0]) == ("succeeded", MoveBaseOutcome.SUCCESS)
-        judged = simulator.wait_for(lambda line: "outcome_code" in line)
-        assert judged["outcome_code"] == MoveBaseOutcome.SUCCESS and judged["success"]
-        assert judged["metrics"]["path_length_m"] > 0.8
-        assert simulator.wait_for_end() == 0
+        self.client.meet()
+
+    def _start(self, kind, *arguments):
+        peer = kind(self._folder, self._domain, self._logs, *arguments)
+        self._closing.callback(peer.end)
+        return peer
+
+    def say_that_it_is_at(self, x, y):
+        """Tell the localisation of the robot, and wait until plans begin there."""
+        self.client.wait(self.client.do(order="place", x=x, y=y), "placed")
+        deadline = time.monotonic() + WITHIN
+        while (begin := self.planned(x + 1.0, y)["poses"][0]) != pytest.approx([x, y], abs=0.1):
+            assert time.monotonic() < deadline, begin
+
+    def planned(self, x, y):
+        return self.client.wait(self.client.send("get_path", target=[x, y]), "result")
+
+
+@pytest.fixture
+def driven(ros_folder, tmp_path):
+    with ExitStack() as closing:
+        yield partial(DrivenWorld, closing, ros_folder, tmp_path)
+
+
+def judge(world):
+    """Drive to the goal of the scenario: client and run know the same outcome."""
+    world.client.wait("goal", "shown")
+    assert world.client.result("move_base", shown=True) == ("succeeded", MoveBaseOutcome.SUCCESS)
+    judged = world.simulator.wait_for(lambda line: "outcome_code" in line)
+    assert judged["outcome_code"] == MoveBaseOutcome.SUCCESS and judged["success"]
+    assert world.simulator.wait_for_end() == 0
+    return judged["metrics"]
+
+
+def test_indoors_the_robot_believes_where_it_is_said_to_be_and_its_goal_is_reached(driven):
+    world = driven(INDOOR, "--sensor", "scan:LaserScan=lidar")
+    world.say_that_it_is_at(3.4, 3.0)
+    world.say_that_it_is_at(3.0, 3.0)
+    assert judge(world)["path_length_m"] > 0.8
+
+
+def test_outdoors_a_goal_is_reached_with_the_same_outcome_for_its_client_and_for_the_run(driven):
+    assert judge(driven(outdoor()))["path_length_m"] > 1.0

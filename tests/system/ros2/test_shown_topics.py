@@ -39,6 +39,7 @@ mesh_map: {{mesh_file: floor.ply, inscribed_radius: 0.3, default_layer: all,
 planners: [{{name: shortest, type: dijkstra}}]
 controllers: [{{name: follow, type: follow_path}}]
 """
+OPTIONS = ("--no-nav2",)
 NODE = "/move_base_flex"
 OF_BOTH = {
     "/plan": ("nav_msgs/Path", "latched"),

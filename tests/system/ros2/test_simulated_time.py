@@ -6,7 +6,7 @@ import pytest
 
 from mbf_abstract.outcomes import MoveBaseOutcome
 
-SIMULATED = True
+SIMULATED, OPTIONS = True, ("--no-nav2",)
 pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
 
 

@@ -1,12 +1,13 @@
 """The interface files that are compiled have the fields of ``interfaces.txt``, proved by parsing them."""
 
+import re
 from pathlib import Path
 
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_ros.ros2.interfaces.definitions import PACKAGES, PARTS, interface_files, used_packages
+from mbf_ros.ros2.interfaces.definitions import JAZZY, KILTED, PACKAGES, PARTS, interface_files, used_packages
 
 HASHES = dict(
     line.split()
@@ -81,6 +82,17 @@ def test_the_constants_of_nav2_are_its_error_codes_and_a_default_is_kept():
         "uint16 TIMEOUT = 741",
     ]
     assert "uint8 max_cost 254" in interface_files("nav2_msgs")["srv/IsPathValid.srv"].splitlines()
+
+
+def test_nav2_of_jazzy_has_lists_of_poses_and_missed_waypoints_and_the_other_packages_are_the_same():
+    kilted, jazzy = (interface_files("nav2_msgs", distribution) for distribution in (KILTED, JAZZY))
+    assert kilted.keys() ^ jazzy.keys() == {"msg/WaypointStatus.msg", "msg/MissedWaypoint.msg"}
+    assert "geometry_msgs/PoseStamped[] poses" in jazzy["action/NavigateThroughPoses.action"].splitlines()
+    assert "nav_msgs/Goals poses" in kilted["action/NavigateThroughPoses.action"].splitlines()
+    assert not [path for path, text in jazzy.items() if re.search("WaypointStatus|Goals|disable_collision", text)]
+    assert jazzy["action/FollowPath.action"] == kilted["action/FollowPath.action"]
+    for package in set(PACKAGES) - {"nav2_msgs"}:
+        assert interface_files(package, JAZZY) == interface_files(package)
 
 
 def test_every_package_that_is_needed_is_named():

@@ -1,4 +1,9 @@
-"""A client of the node: each line of stdin is a JSON order, and what comes of it is a JSON line on stdout."""
+"""A client of the node: each line of stdin is a JSON order, and what comes of it is a JSON line on stdout.
+
+All that is sent is sent on the thread of the executor. Of rclpy 9.1.2 ``send_goal_async`` makes two futures and returns
+the second one, and 7.1.6 makes its only one after it has sent: an answer that comes before on another thread is lost,
+and the goal waits for ever.
+"""
 
 import collections
 import json
@@ -7,14 +12,18 @@ import threading
 import time
 
 import rclpy
+import rclpy.action.client
 from action_msgs.msg import GoalStatus
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from mbf_msgs.action import ExePath, GetPath, MoveBase, Recovery
 from mbf_msgs.srv import CheckPath, CheckPoint, CheckPose, FindValidPose
 from nav_msgs.msg import Path
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.action import ActionClient
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
 from std_srvs.srv import Empty, Trigger
 
 ACTIONS = {"get_path": GetPath, "exe_path": ExePath, "move_base": MoveBase, "recovery": Recovery}
@@ -40,7 +49,8 @@ rclpy.init()
 node = rclpy.create_node("client")
 clients = {name: ActionClient(node, kind, f"/move_base_flex/{name}") for name, kind in ACTIONS.items()}
 services = {name: node.create_client(kind, f"/move_base_flex/{name}") for name, kind in SERVICES.items()}
-handles = {}
+initial_pose = node.create_publisher(PoseWithCovarianceStamped, "initialpose", 10)
+handles, shown_goals = {}, []
 
 
 def say(**fields):
@@ -71,8 +81,19 @@ def pose(x, y, frame="map", w=1.0):
     return stamped
 
 
-def send(key, action, target=None, path=None, **fields):
+class LateFuture(Future):
+    """As where another thread gets its turn while a goal is being sent."""
+
+    def __init__(self, **fields):
+        time.sleep(0.3)
+        super().__init__(**fields)
+
+
+def send(key, action, target=None, path=None, shown=False, late=False, **fields):
+    """Send a goal: to a target, along a path, or to the goal that a simulator shows."""
     goal = ACTIONS[action].Goal(**fields)
+    if shown:
+        goal.target_pose = shown_goals[-1]
     if target is not None:
         goal.target_pose = pose(*target)
     if path is not None:
@@ -100,7 +121,14 @@ def send(key, action, target=None, path=None, **fields):
         status = STATUSES[future.result().status]
         say(key=key, what="result", status=status, outcome=result.outcome, message=result.message, poses=poses)
 
+    rclpy.action.client.Future = LateFuture if late else Future
     clients[action].send_goal_async(goal, feedback_callback=feedback).add_done_callback(accepted)
+    rclpy.action.client.Future = Future
+
+
+def take_shown_goal(message):
+    shown_goals.append(message)
+    say(key="goal", what="shown")
 
 
 def repeat(key, number):
@@ -166,6 +194,14 @@ def put(key, name, value):
     services["set_parameters"].call_async(request).add_done_callback(answered)
 
 
+def place(key, x, y):
+    """Say where the robot is."""
+    said, message = pose(x, y), PoseWithCovarianceStamped()
+    message.header, message.pose.pose = said.header, said.pose
+    initial_pose.publish(message)
+    say(key=key, what="placed")
+
+
 def look(key, topic):
     """Say when somebody publishes on a topic."""
     while not node.count_publishers(topic):
@@ -173,18 +209,29 @@ def look(key, topic):
     say(key=key, what="seen")
 
 
-threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+def take_orders():
+    for line in sys.stdin:
+        order = json.loads(line)
+        name = order.pop("order")
+        if name in waiting:
+            waiting[name](**order)
+        else:
+            executor.create_task(orders[name], **order)
+
+
+executor = SingleThreadedExecutor()
+executor.add_node(node)
+waiting = {"meet": meet, "find": find, "look": look}
+latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+node.create_subscription(PoseStamped, "/simulator/goal", take_shown_goal, latched)
 orders = {
-    "meet": meet,
-    "find": find,
     "send": send,
     "repeat": repeat,
     "cancel": cancel,
     "call": call,
     "get": get,
     "put": put,
-    "look": look,
+    "place": place,
 }
-for line in sys.stdin:
-    order = json.loads(line)
-    orders[order.pop("order")](**order)
+threading.Thread(target=take_orders, daemon=True).start()
+executor.spin()
