@@ -27,19 +27,18 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import fast_simplification
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
+from mbf_mesh_nav.building.decimation import decimated_to
 from mbf_mesh_nav.building.map_build import write_map
 from mbf_mesh_nav.building.map_facts import map_facts
 from mbf_mesh_nav.building.surface import BuiltSurface, build_surface
 from mbf_mesh_nav.files.map_header import MapHeader
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.mesh.repair import REPAIRS, checked_mesh
 from terrain.experiments.evaluation.outdoor import FROM_CORNER, LEVELS, SIZE, generated
 from terrain.experiments.evaluation.reachability import is_reachable
 from terrain.physics.robot_models import HUSKY
@@ -136,8 +135,7 @@ def misplaced(points: FloatArray, rng: np.random.Generator) -> FloatArray:
 def coarser(built: BuiltMap, rng: np.random.Generator) -> BuiltMap:
     """A quarter of the vertices, with wrong heights; the error is what the vertices of the built map show."""
     vertices, faces, error = built
-    points, corners = fast_simplification.simplify(vertices, faces, target_reduction=1.0 - COARSE_SHARE)
-    mesh, _ = checked_mesh(points, corners, [name for name in REPAIRS if name != "small_components"])
+    mesh = decimated_to(vertices, faces, COARSE_SHARE)
     points = mesh.vertices + [0.0, 0.0, 1.0] * rng.uniform(-COARSE_HEIGHTS, COARSE_HEIGHTS, (len(mesh.vertices), 1))
     locator = MeshMap.from_arrays(points, mesh.faces).locator
     above = vertices + np.array([0.0, 0.0, 5.0])

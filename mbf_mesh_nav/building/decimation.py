@@ -58,7 +58,7 @@ def decimated(vertices: FloatArray, faces: IntArray, bound: float) -> DecimatedM
     MeshError
         ``fast-simplification`` is not installed.
     """
-    whole = SurfaceLocator(build_topology(checked_mesh(vertices, faces)[0]))
+    whole = _locator(vertices, faces)
     best, kept, broken = DecimatedMesh(vertices, faces), 1.0, LEAST_SHARE
     for _ in range(BISECTIONS):
         share = 0.5 * (kept + broken)
@@ -68,6 +68,24 @@ def decimated(vertices: FloatArray, faces: IntArray, bound: float) -> DecimatedM
         else:
             broken = share
     return best
+
+
+def decimated_to(vertices: FloatArray, faces: IntArray, share: float) -> DecimatedMesh:
+    """Leave out all but a share of the faces, whatever the distance of both surfaces is then; it is measured.
+
+    Raises
+    ------
+    MeshError
+        ``fast-simplification`` is not installed, or so few faces are no sound mesh.
+    """
+    coarse = _of_share(vertices, faces, _locator(vertices, faces), share)
+    if coarse is None:
+        raise MeshError("mesh", [f"{share:.1%} of its {len(faces)} faces are no sound mesh"])
+    return coarse
+
+
+def _locator(vertices: FloatArray, faces: IntArray) -> SurfaceLocator:
+    return SurfaceLocator(build_topology(checked_mesh(vertices, faces)[0]))
 
 
 def _of_share(vertices: FloatArray, faces: IntArray, whole: SurfaceLocator, share: float) -> DecimatedMesh | None:

@@ -5,7 +5,7 @@ import pytest
 from cloud_files import write_ply
 from surveyed_ground import ground, hills, tree
 
-from mbf_mesh_nav.building.decimation import decimated
+from mbf_mesh_nav.building.decimation import decimated, decimated_to
 from mbf_mesh_nav.building.map_build import build_map
 from mbf_mesh_nav.building.surface import SurfaceParameters, build_surface
 from mbf_mesh_nav.files.map_header import read_map_header
@@ -49,6 +49,15 @@ def test_where_no_coarser_mesh_keeps_the_bound_nothing_is_left_out(surface):
     whole = decimated(surface.vertices, surface.faces, 1e-6)
     assert whole.faces is surface.faces
     assert whole.error_max == 0.0
+
+
+def test_a_quarter_of_the_faces_covers_no_part_of_a_hole(surface):
+    coarse = decimated_to(surface.vertices, surface.faces, 0.25)
+    assert len(coarse.faces) == pytest.approx(0.25 * len(surface.faces), rel=0.1)
+    mesh_map = MeshMap.from_arrays(surface.vertices, surface.faces)
+    on_coarse = some_places(coarse.vertices, coarse.faces)
+    near = np.hypot(*(on_coarse[:, :2] - (8.0, 6.0)).T) < 0.6
+    assert mesh_map.locate(on_coarse[near]).distances.max() < 0.06
 
 
 def test_the_map_file_states_what_decimation_adds_to_its_error(tmp_path):
