@@ -25,9 +25,9 @@ INTRODUCTION = f"""\
 A robot has one configuration, a YAML file. Start from one that passes `mbf check`:
 
 ```sh
-mbf config                                                          # the list below
-mbf config costmap_differential --map office.yaml --out robot.yaml  # writes one, for your map
-mbf check robot.yaml                                                # every mistake at once, with its line
+mbf config             # the list below; with a name it writes one, for your map:
+mbf config costmap_differential --map office.yaml --out robot.yaml
+mbf check robot.yaml   # every mistake at once, with its line
 ```
 
 {{starters}}

@@ -131,7 +131,7 @@ def test_a_drag_is_a_goal_with_a_heading_waypoints_are_driven_and_the_stick_driv
         x, y = await page.evaluate(PLACE)
         await page.drag((x, y), (x + 60, y), modifiers=8)
         await page.read("what: new goal")
-        await page.wait_for(f"{VALUES}.includes('place')")
+        await page.wait_for(f"{VALUES}.includes('inflation')")  # a layer, after the map's next update
         values = await page.evaluate(VALUES)
         await page.choose("a click is", "a waypoint")
         await page.click(x, y)
