@@ -41,7 +41,8 @@ def build(
     crs: str = typer.Option(
         "",
         "--crs",
-        help="Coordinate system of the files, such as EPSG:25832; else as they state. Kept, not transformed.",
+        help="Coordinate system of the files: EPSG:25832, a PROJ string or well-known text; else as they state. "
+        "Kept, not transformed.",
     ),
     cell: float = typer.Option(0.0, "--cell", min=0.0, help="Distance of the vertices [m]; 0 = by the density."),
     clearance: float = typer.Option(1.5, "--clearance", help="Free height that the robot needs [m]."),

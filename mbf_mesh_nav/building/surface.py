@@ -131,7 +131,11 @@ def build_surface(
     is_outlier = isolated_points(points, 2.0 * cell, chosen.outlier_points)
     kept = points[~is_outlier] if is_outlier.any() else points
     if not len(kept):
-        raise MeshError("point cloud", [f"all of its {len(points)} points are isolated"], "Choose a larger --cell")
+        raise MeshError(
+            "point cloud",
+            [f"all of its {len(points)} points are isolated"],
+            "Give their unit with --scale, or choose a larger --cell",
+        )
     on_step("surfaces")
     grid = Grid.around(kept, cell)
     rise = cell * float(tan(np.radians(chosen.max_slope))) + chosen.ground_thickness

@@ -13,24 +13,23 @@ from typing import Any
 
 import numpy as np
 
-from mbf_mesh_nav.building.clouds.stored_points import LONGEST_CRS, StoredPoints, refuse_count
+from mbf_mesh_nav.building.clouds.coordinate_system import name_of_text
+from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, refuse_count
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 PACKAGES = {".las": ("laspy",), ".laz": ("laspy", "lazrs")}
 NOISE_CLASSES = (7, 18)
 CHUNK_POINTS = 1_000_000
 GEO_KEYS, WELL_KNOWN_TEXT = 34735, 2112
-MODEL_TYPE, PROJECTED_SYSTEM, LINEAR_UNIT, GEOGRAPHIC = 1024, 3072, 3076, 2
+MODEL_TYPE, PROJECTED_SYSTEM, LINEAR_UNIT, VERTICAL_UNIT, GEOGRAPHIC = 1024, 3072, 3076, 4099, 2
 USER_DEFINED = 32767
 UNITS = {9001: 1.0, 9002: 0.3048, 9003: 1200.0 / 3937.0}
 """Length [m] of the linear units of GeoTIFF keys: metre, foot, survey foot of the United States."""
 
 LENGTH_UNIT = re.compile(r'UNIT\["[^"]*(?:met|foot|feet|ft)[^"]*",\s*([0-9.eE+-]+)', re.IGNORECASE)
 """A linear unit of a coordinate system as well-known text, with its length [m]."""
-
-EPSG_CODE = re.compile(r'AUTHORITY\["EPSG",\s*"?(\d+)"?\]\s*\]\s*$')
-"""The code of a whole coordinate system, which stands at the end of its text."""
-SYSTEM_NAME = re.compile(r'^\s*\w+\["([^"]+)"')
+SMALLEST_HEADER = 227
+"""Bytes of the header of LAS 1.0."""
 
 
 def read_las_points(path: Path, max_points: int) -> StoredPoints:
@@ -45,6 +44,9 @@ def read_las_points(path: Path, max_points: int) -> StoredPoints:
         raise MeshError(str(path), [f"needs {' and '.join(missing)}: pip install 'mbf-flex[maps]'"])
     import laspy
 
+    if (size := path.stat().st_size) < SMALLEST_HEADER:
+        text = f"the file is cut off within its header: expected at least {SMALLEST_HEADER} bytes, found {size}"
+        raise MeshError(str(path), [text])
     try:
         with laspy.open(path) as reader:
             header = reader.header
@@ -60,7 +62,7 @@ def read_las_points(path: Path, max_points: int) -> StoredPoints:
     except MeshError:
         raise
     except Exception as error:  # laspy, lazrs and struct each raise their own for damaged files
-        raise MeshError(str(path), [f"cannot be read as LAS: {type(error).__name__}: {error}"]) from error
+        raise MeshError(str(path), [f"is cut off, damaged or no LAS: {type(error).__name__}: {error}"]) from error
     dropped = count - int(is_kept.sum())
     notes = (f"{dropped} points are classified as noise or withheld",) if dropped else ()
     return StoredPoints(points[is_kept] if dropped else points, notes=notes, unit=unit, crs=_crs(text, keys))
@@ -93,13 +95,9 @@ def _stated_system(header: Any) -> tuple[str, dict[int, int]]:
 
 def _crs(text: str, keys: dict[int, int]) -> str:
     """Code or name of the coordinate system, "" if the file states none."""
-    code = EPSG_CODE.search(text)
-    number = int(code.group(1)) if code else keys.get(PROJECTED_SYSTEM, 0)
-    if 0 < number != USER_DEFINED:
-        return f"EPSG:{number}"
-    name = SYSTEM_NAME.search(text)
-    words = " ".join(name.group(1).split()) if name is not None else ""
-    return "".join(one if one.isascii() and one.isprintable() else "?" for one in words[:LONGEST_CRS])
+    name = name_of_text(text)
+    code = keys.get(PROJECTED_SYSTEM, 0)
+    return name if name.startswith("EPSG:") or not 0 < code != USER_DEFINED else f"EPSG:{code}"
 
 
 def _unit(path: Path, text: str, keys: dict[int, int]) -> float:
@@ -107,7 +105,9 @@ def _unit(path: Path, text: str, keys: dict[int, int]) -> float:
     if keys.get(MODEL_TYPE) == GEOGRAPHIC or text.startswith("GEOGCS"):
         raise MeshError(str(path), ["its coordinates are degrees; project them to metres first"])
     lengths = [float(length) for length in LENGTH_UNIT.findall(text)]
+    if not lengths and keys.get(LINEAR_UNIT) in UNITS:
+        lengths = [UNITS[keys[unit]] for unit in (LINEAR_UNIT, VERTICAL_UNIT) if keys.get(unit) in UNITS]
     if len(set(lengths)) > 1:
         text = ", ".join(f"{length:g} m" for length in lengths)
         raise MeshError(str(path), [f"its coordinate system mixes units ({text}); convert it to one unit first"])
-    return lengths[0] if lengths else UNITS.get(keys.get(LINEAR_UNIT, 0), 0.0)
+    return lengths[0] if lengths else 0.0

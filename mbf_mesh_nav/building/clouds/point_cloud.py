@@ -14,13 +14,14 @@ import numpy as np
 
 from mbf_abstract.config.bounded_files import special_file
 from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.building.clouds.coordinate_system import given_system
 from mbf_mesh_nav.building.clouds.las_points import read_las_points
 from mbf_mesh_nav.building.clouds.mesh_points import MESH_ENDINGS, read_mesh_points
 from mbf_mesh_nav.building.clouds.octomap_points import read_octomap_points
 from mbf_mesh_nav.building.clouds.pcd_points import read_pcd_points
 from mbf_mesh_nav.building.clouds.ply_points import has_faces, read_ply_points
 from mbf_mesh_nav.building.clouds.run_points import read_run_points
-from mbf_mesh_nav.building.clouds.stored_points import LONGEST_CRS, StoredPoints, refuse_count
+from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, refuse_count
 from mbf_mesh_nav.building.clouds.text_points import read_text_points
 from mbf_mesh_nav.files.elevation_files import elevation_readers
 from mbf_mesh_nav.files.file_frames import FileFrame, on_the_map
@@ -94,7 +95,8 @@ def read_clouds(
     unit : float
         Length of the files' unit [m]; 0 = as the files state, else 1.
     crs : str
-        Coordinate system of all files, such as "EPSG:25832"; "" = as they state. Nothing is transformed.
+        Coordinate system of all files as in ``coordinate_system.given_system``, such as "EPSG:25832"; "" = as they
+        state. Nothing is transformed.
     max_points : int
         Files of more points, together, are refused before their points are read.
     drop_invalid : bool
@@ -106,11 +108,9 @@ def read_clouds(
     ------
     MeshError
         A file cannot be read, holds points that are not finite, or coordinates that are no metres; or the files have
-        different units or coordinate systems.
+        different units or coordinate systems, or ``crs`` is none.
     """
-    if len(crs) > LONGEST_CRS or not (crs.isascii() and crs.isprintable()):
-        text = f"crs: expected at most {LONGEST_CRS} characters of ASCII, such as EPSG:25832, got {crs!r:.60}"
-        raise MeshError("point cloud", [text])
+    system = given_system(crs)
     if not files:
         raise MeshError("point cloud", ["there is no input file"])
     parts, notes, stated = list[FloatArray](), list[str](), dict[Path, float]()
@@ -130,17 +130,22 @@ def read_clouds(
             f"{file.name} {length:g} m" if length else f"{file.name} none" for file, length in stated.items()
         )
         raise MeshError("point cloud", [f"the files state different units ({text}); give one unit for all"])
-    if len(systems) > 1 and not crs:
+    if len(systems) > 1 and not system:
         text = ", ".join(f"{name} {system}" for system, name in systems.items())
         hint = "Transform them to one, or give the right one with --crs"
         raise MeshError("point cloud", [f"the files state different coordinate systems ({text})"], hint)
+    notes += [
+        f"{name} states {one}, the map keeps {system} as given"
+        for one, name in systems.items()
+        if system not in ("", one)
+    ]
     _refuse_units(files, parts, is_stated=bool(stated[files[0]]))
     origin = _origin(parts)
     for part in parts:
         part -= origin
     cloud = parts[0] if len(parts) == 1 else np.concatenate(parts)
     x, y, z = origin.tolist()
-    return PointCloud(cloud, (x, y, z), stated[files[0]] or 1.0, tuple(notes), crs or next(iter(systems), ""))
+    return PointCloud(cloud, (x, y, z), stated[files[0]] or 1.0, tuple(notes), system or next(iter(systems), ""))
 
 
 def _read(file: Path, max_points: int, up_axis: str, unit: float) -> tuple[StoredPoints, bool]:
@@ -208,6 +213,8 @@ def _refuse_units(files: Sequence[Path], parts: Sequence[FloatArray], is_stated:
     upper = np.max([part.max(axis=0) for part in parts], axis=0)
     length, height = float(max(upper[:2] - lower[:2])), float(upper[2] - lower[2])
     size = f"{upper[0] - lower[0]:.6g} x {upper[1] - lower[1]:.6g} x {height:.6g} m"
+    if length == 0.0:
+        raise MeshError(str(files[0]), ["all of its points lie at one place in the plan view"])
     if is_degrees(lower, upper) and height > 10.0 * length:
         raise MeshError(str(files[0]), [f"x and y look like degrees ({size}); project them to metres first"])
     if not is_stated and length > LONGEST:

@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
-LONGEST_CRS = 200
-"""Characters of the name of a coordinate system, which is kept in the header of a map file."""
-
 
 class StoredPoints(NamedTuple):
     """Contents of one file.

@@ -57,7 +57,7 @@ def write_pcd(file, points, form="binary", size=8, height=1, promised=None):
     return file
 
 
-def write_las(file, points, scale=0.001, offset=(0.0, 0.0, 0.0), classes=None, well_known_text=""):
+def write_las(file, points, scale=0.001, offset=(0.0, 0.0, 0.0), classes=None, well_known_text="", geo_keys=()):
     """Write a LAS or LAZ file of version 1.4."""
     import laspy
 
@@ -65,6 +65,9 @@ def write_las(file, points, scale=0.001, offset=(0.0, 0.0, 0.0), classes=None, w
     header.scales, header.offsets = np.full(3, scale), np.asarray(offset)
     if well_known_text:
         header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(well_known_text))
+    if geo_keys:
+        numbers = [1, 1, 0, len(geo_keys), *(number for key, value in geo_keys for number in (key, 0, 1, value))]
+        header.vlrs.append(laspy.VLR("LASF_Projection", 34735, "", np.array(numbers, "<u2").tobytes()))
     cloud = laspy.LasData(header)
     cloud.x, cloud.y, cloud.z = points.T
     if classes is not None:

@@ -16,6 +16,7 @@ from cloud_files import (
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mbf_mesh_nav.building.clouds.coordinate_system import given_system
 from mbf_mesh_nav.building.clouds.point_cloud import read_clouds
 from mbf_mesh_nav.kernels.building.lzf import lzf_decompress
 from mbf_mesh_nav.mesh.mesh_report import MeshError
@@ -195,6 +196,7 @@ def test_coordinates_that_four_bytes_cannot_hold_are_refused(tmp_path):
     ("points", "text"),
     [
         (POINTS * 1e4, "its unit is hardly the metre. Give the unit, e.g. --scale 0.001 for millimetres"),
+        (POINTS * [0.0, 0.0, 1.0], "all of its points lie at one place in the plan view"),
         (POINTS * 0.001, "too small for a map. If its unit is not the metre, give it with --scale"),
         (POINTS * [1e-5, 1e-5, 10.0] + [8.05, 52.27, 60.0], "x and y look like degrees"),
     ],
@@ -239,7 +241,41 @@ def test_files_of_different_coordinate_systems_are_refused(tmp_path):
     ):
         read_clouds(files)
     assert read_clouds(files, crs="EPSG:25832").crs == "EPSG:25832"
-    assert "crs: expected at most 200 characters of ASCII" in refusal(files[0], crs="two\nlines")
+    assert read_clouds(files, crs="EPSG:25832").notes == (
+        "25833.las states EPSG:25833, the map keeps EPSG:25832 as given",
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ("epsg:25832", "EPSG:25832"),
+        ("EPSG:25832+7837", "EPSG:25832+7837"),
+        ("urn:ogc:def:crs:EPSG::25832", "EPSG:25832"),
+        ("+proj=utm +zone=32 +ellps=GRS80 +units=m +no_defs", "+proj=utm +zone=32 +ellps=GRS80 +units=m +no_defs"),
+        ('PROJCS["a grid",UNIT["metre",1],\n AUTHORITY["EPSG","25832"]]', "EPSG:25832"),
+        ('PROJCRS["a grid",BASEGEOGCRS["b"],ID["EPSG",25832]]', "EPSG:25832"),
+        (f'LOCAL_CS["the yard",UNIT["metre",1],EXTENSION["{"x" * 300}"]]', "the yard"),
+    ],
+)
+def test_a_given_coordinate_system_is_kept_by_its_code_or_name(given, kept):
+    assert given_system(given) == kept
+
+
+@pytest.mark.parametrize(
+    "given",
+    ["banana", "25832", "EPSG:abc", "EPSG:99999999", "EPSG:12", 'PROJCS["x', "+proj=", "+zone=32", "two\nlines"],
+)
+def test_what_is_no_coordinate_system_is_refused_before_a_file_is_read(tmp_path, given):
+    text = refusal(tmp_path / "none.las", crs=given)
+    assert text.startswith("point cloud: crs: expected a code such as EPSG:25832, well-known text or a PROJ string")
+    assert text.endswith(f"got {given!r}")
+
+
+@pytest.mark.parametrize("given", ["EPSG:4326", "+proj=longlat +datum=WGS84", 'GEOGCS["a globe",UNIT["degree",0.017]]'])
+def test_no_map_is_in_degrees(given):
+    with pytest.raises(MeshError, match="is in degrees, a map is in metres"):
+        given_system(given)
 
 
 @pytest.mark.parametrize(
@@ -256,6 +292,15 @@ def test_a_las_file_in_degrees_or_mixed_units_is_refused(tmp_path, text, reason)
     assert reason in refusal(write_las(tmp_path / "survey.las", POINTS, well_known_text=text))
 
 
+@pytest.mark.parametrize(("vertical", "is_mixed"), [(9001, False), (9002, True)])
+def test_a_las_file_whose_keys_give_heights_another_unit_is_refused(tmp_path, vertical, is_mixed):
+    file = write_las(tmp_path / "survey.las", POINTS, geo_keys=((3072, 25832), (3076, 9001), (4099, vertical)))
+    if is_mixed:
+        assert "mixes units (1 m, 0.3048 m)" in refusal(file)
+    else:
+        assert read_clouds([file]).crs == "EPSG:25832"
+
+
 @pytest.mark.parametrize(
     ("name", "content", "text"),
     [
@@ -269,7 +314,8 @@ def test_a_las_file_in_degrees_or_mixed_units_is_refused(tmp_path, text, reason)
         ("a.ply", PLY_HEAD + b"element vertex 9\n" + 2 * b"property float x\n" + b"end_header\n", "cannot be read"),
         ("a.pcd", b"VERSION 0.7\nFIELDS x y\nSIZE 4\nTYPE F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2\n", "no PCD header"),
         ("a.pcd", b"nothing", "is no PCD"),
-        ("a.las", b"LASF" + bytes(100), "cannot be read as LAS"),
+        ("a.las", b"LASF" + bytes(100), "cut off within its header: expected at least 227 bytes, found 104"),
+        ("a.las", bytes(300), "is cut off, damaged or no LAS"),
         ("a.e57", b"", "unknown ending '.e57', known are: .bt, .csv, .dae, .glb"),
     ],
 )
