@@ -36,7 +36,7 @@ def outdoor():
     """The scenario that ships, on a smaller piece of ground, with a goal two metres from its start."""
     scenario = yaml.safe_load((LIBRARY / "outdoor.yaml").read_text("utf-8"))
     scenario["navigation"] = {name: f"{LIBRARY}/{file}" for name, file in scenario["navigation"].items()}
-    scenario["world"]["size"] = 16.0
+    scenario["world"] |= {"size": 16.0, "spacing": 0.25}  # m; points as far apart as at the full size of 100 m
     scenario["goals"] = [{"x": 9.4, "y": 9.4, "yaw": 0.8}]
     return yaml.safe_dump(scenario)
 
