@@ -16,6 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Success
 from py_trees.common import ParallelPolicy
 from py_trees.composites import Parallel, Sequence
 
@@ -201,10 +202,12 @@ def _unblock(options: TreeOptions) -> Behaviour:
     if not (o.wait and o.give_way):
         return usual
     around = UpdatePath("plan around it", o.planner, longest=o.longest_update, refiner=o.refiner)
-    by_motion = {
+    by_motion: dict[Motion, Behaviour] = {
         Motion.MOVING: Recovery(o.wait),
         Motion.WAITING: RoundRobin("yield", [Recovery(o.wait), around, Recovery(o.give_way)]),
     }
+    if not o.reuse_path:  # every recovery that succeeds is followed by a plan; otherwise one that fails is
+        by_motion[Motion.PARKED] = Success("plan around it at once")
     return PickByMotion("who is in the way?", by_motion, nobody=usual)
 
 

@@ -1,6 +1,7 @@
 """The ready trees on a robot without walls: what they do when planning or driving fails."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -8,6 +9,8 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.executives.reference_trees import TreeOptions, control_tree, navigation_tree, planning_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.tracking.blocking import Blockage
+from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RefinePathOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult, RefineResult
 from mbf_abstract.testing.faulty import drive
@@ -118,6 +121,24 @@ def test_without_reuse_of_the_path_every_failure_costs_a_plan(make_session, reco
     options = TreeOptions(check_poses=False, second_planner_pause=0.0, reuse_path=False)
     assert run(session, navigation_tree(options)).success
     assert (plans(session), recoveries(session)) == (4, ["clear", "back_up", "clear"])
+
+
+@pytest.mark.parametrize("reuse_path", [True, False])
+@pytest.mark.parametrize(
+    ("motion", "recovery", "plans_made"),
+    [(Motion.PARKED, [], 2), (Motion.MOVING, ["relax"], 1), (Motion.WAITING, ["relax"], 1)],
+)
+def test_who_is_in_the_way_decides_between_waiting_and_planning_around(
+    make_session, recoveries, monkeypatch, reuse_path, motion, recovery, plans_made
+):
+    session = make_session()
+    session.controller.play(BLOCKED, session.controller.follow)
+    somebody = Blockage(SimpleNamespace(motion=motion), 0, 1.0)
+    monkeypatch.setattr(type(session.server), "queries", SimpleNamespace(what_blocks=lambda path: (somebody,)))
+    options = replace(OPTIONS, wait="relax", give_way="back_up", reuse_path=reuse_path)
+    result = run(session, navigation_tree(options))
+    assert result.success, result.message
+    assert (plans(session), recoveries(session)) == (plans_made if reuse_path else 2, recovery)
 
 
 def test_without_codes_recoveries_are_taken_in_their_fixed_order(make_session, recoveries):
