@@ -99,8 +99,7 @@ class LayeredMap(NavigationMap):
             limits = layer.parameters
             if not objects or not isinstance(limits, ContactParameters) or not limits.stop_before_contact:
                 continue
-            asked = self.robot_box, pose, velocity, command, objects, limits, self.same_storey
-            share, touched = safe_share(*asked)
+            share, touched = safe_share(self.robot_box, pose, velocity, command, objects, limits, self.same_storey)
             if touched is not None and share < least[0]:
                 least = share, in_the_way(touched), limits.max_wait
         return least

@@ -32,10 +32,12 @@ FIRST_SEEN, LAST_SEEN, SCANS, ANCHOR_X, ANCHOR_Y, ANCHOR_TIME, HAS_MOVED, CLEARE
     10, STATE_COLUMNS
 )
 """Columns of the state of an object. It stood at its anchor at ``ANCHOR_TIME`` [s]; ``HAS_MOVED`` is 0 or 1, and so is
-``CLEARED``: whether it was cleared and not seen since. In its last scan it was ``OFF`` [m] where it was expected."""
+``CLEARED``: whether it was cleared and not seen since. In its last scan it was ``OFF`` [m] away from where it was
+expected."""
 NOBODY = -1
 TURNED = 0.5
-"""An object has turned if it is off to the same side in two scans, by this many standard deviations on the average."""
+"""An object has turned if it is off to the same side in two scans, by this many standard deviations: the geometric mean
+of both scans."""
 
 
 @kernel
