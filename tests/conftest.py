@@ -1,6 +1,7 @@
 """Fixtures that every test may use."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,19 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeat"))
 
 LONGEST = ("unit/actions/test_interleavings.py", "determinism/", "system/ros2/test_actions_and_services.py")
 """Files of minutes. A worker takes a file whole, so these come first: the last ones to begin are short."""
+
+
+@pytest.fixture(scope="module")
+def one_core() -> Iterator[None]:
+    """For drives in simulated time: their threads run by turns, and handing a turn to another core doubles its cost."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    cores = sorted(os.sched_getaffinity(0))
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    os.sched_setaffinity(0, {cores[worker % len(cores)]})  # of this thread, and of what it starts
+    yield
+    os.sched_setaffinity(0, cores)
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,8 @@ import pytest
 
 from mbf_abstract.testing.conformance import SITUATIONS, check_map_backend
 
+pytestmark = pytest.mark.usefixtures("one_core")
+
 
 @pytest.mark.parametrize("situation", SITUATIONS)
 def test_every_backend_keeps_the_contract(make_server, situation):

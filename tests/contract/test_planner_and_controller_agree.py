@@ -8,6 +8,8 @@ import pytest
 
 from mbf_abstract.plugins import PlanRequest, PluginKind
 
+pytestmark = pytest.mark.usefixtures("one_core")
+
 SOURCE = Path(__file__).resolve().parents[2] / "benchmarks" / "agreement.py"
 SPEC = spec_from_file_location("agreement", SOURCE)
 agreement = sys.modules["agreement"] = module_from_spec(SPEC)

@@ -12,6 +12,8 @@ from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.testing.conformance.rig import Box
 from mbf_abstract.testing.conformance.site import site
 
+pytestmark = pytest.mark.usefixtures("one_core")
+
 WALL = Box(5.0, -0.5, 5.4, 8.5)  # across the whole floor
 DOOR = [Box(5.0, -0.5, 5.4, 3.5), Box(5.0, 4.5, 5.4, 8.5)]  # 1 m wide; the robot has 0.6 m
 SOMEBODY = Box(5.0, 3.5, 5.4, 4.5)

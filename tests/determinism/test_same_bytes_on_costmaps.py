@@ -5,7 +5,7 @@ A file for each kind of map, so that two workers share the work: each compiles a
 
 import pytest
 
-pytestmark = pytest.mark.timeout(1800)
+pytestmark = [pytest.mark.timeout(1800), pytest.mark.usefixtures("one_core")]
 
 BACKEND = "costmap"
 MORE = ["table1/S1", "table1/B"]

@@ -23,7 +23,7 @@ from terrain.scenarios.scenario import PlanarPose, load_scenario
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.viewer.live.session import LiveSession, ViewOptions
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.timeout(300), pytest.mark.usefixtures("one_core")]
 
 SCENARIO = {
     "name": "corridor",

@@ -9,7 +9,7 @@ from terrain.provenance.provenance import read_provenance
 from terrain.scenarios.scenario import MapWorld, PlanarPose, load_scenario
 from terrain.session.runner import RunOptions, run_scenario
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.timeout(300), pytest.mark.usefixtures("one_core")]
 
 
 def run(scenario, folder, **options):

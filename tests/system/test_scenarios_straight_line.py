@@ -11,7 +11,7 @@ from terrain.session.runner import RunOptions, run_scenario
 
 SETTLING_CALLS = 20
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.timeout(300), pytest.mark.usefixtures("one_core")]
 
 
 class StraightLinePlanner(MeshPlanner):

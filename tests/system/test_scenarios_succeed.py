@@ -11,7 +11,7 @@ RUN_ELSEWHERE = {"outdoor", "indoor", "two_couriers"}  # test_run_scenarios.py, 
 
 TIME_TO_NOTICE = 2.0  # s; a second until the map counts as stale, then the robot brakes
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.timeout(300), pytest.mark.usefixtures("one_core")]
 
 
 def test_at_least_twelve_scenarios_ship_and_each_says_what_it_proves():

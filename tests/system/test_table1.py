@@ -12,7 +12,10 @@ from terrain.experiments.table1.main_run import buildings
 from terrain.experiments.table1.main_run.trial import Trial, run_trial, tally_of
 from terrain.experiments.table1.repetition import run_repetition
 
-pytestmark = pytest.mark.timeout(300)  # a leg takes some ten seconds of processor time
+pytestmark = [  # a leg takes some ten seconds of processor time
+    pytest.mark.timeout(300),
+    pytest.mark.usefixtures("one_core"),
+]
 DEPOT = Path(__file__).with_name("table1_depot.yaml")
 
 

@@ -13,7 +13,7 @@ from terrain.scenarios.library import LIBRARY
 from terrain.sweeps.log import SweepLog
 from terrain.viewer.pictures.colours import WARNING
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.timeout(300), pytest.mark.usefixtures("one_core")]
 
 
 def mbf(*arguments):

@@ -21,6 +21,8 @@ from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, S
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.sim_clock import SimClock
 
+pytestmark = pytest.mark.usefixtures("one_core")
+
 SCHEDULES = int(os.environ.get("MBF_SCHEDULES", "2000"))
 FIRST = int(os.environ.get("MBF_FIRST_SCHEDULE", "0"))
 PARTS = 20

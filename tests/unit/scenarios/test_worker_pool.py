@@ -3,6 +3,8 @@
 import os
 import signal
 
+import pytest
+
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from terrain.sweeps.worker_pool import run_in_workers
 
@@ -22,3 +24,15 @@ def test_a_job_whose_worker_is_terminated_is_given_to_another(tmp_path):
     ((job, process),) = run_in_workers(end_once, [str(marker)], 1)
     assert job == str(marker)
     assert process != int(marker.read_text())
+
+
+def cores_of(job):
+    return os.sched_getaffinity(0)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="processes cannot be given cores here")
+def test_workers_keep_to_different_cores_unless_there_are_fewer_cores():
+    cores = os.sched_getaffinity(0)
+    found = [core for _, core in run_in_workers(cores_of, range(len(cores)), len(cores))]
+    assert sorted(core for own in found for core in own) == sorted(cores)
+    assert all(own == cores for _, own in run_in_workers(cores_of, [0], len(cores) + 1))
