@@ -145,7 +145,7 @@ def test_where_a_map_cannot_be_written_it_is_not_begun(tmp_path, survey):
     ("arguments", "text"),
     [
         (["--up", "w"], "expected x, y or z, got 'w'"),
-        (["--step-height", "-1"], "step_height"),
+        (["--step-height", "-1"], "error: step_height: input should be greater than or equal to 0.02, got -1.0"),
         (["--max-points", "10"], "the limit is 10 (max_points)"),
     ],
 )
