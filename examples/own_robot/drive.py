@@ -111,11 +111,18 @@ def notify(text: str) -> None:
             channel.sendto(text.encode(), address.replace("@", "\0", 1))
 
 
+def device_there(path: str) -> str:
+    """Check the name of a device."""
+    if not os.path.exists(path):
+        raise argparse.ArgumentTypeError(f"{path} is not there: is it plugged in?")
+    return path
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("config")
     for line in ("--base", "--lidar", "--beacons"):
-        parser.add_argument(line, required=True, metavar="DEVICE")
+        parser.add_argument(line, required=True, metavar="DEVICE", type=device_there)
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument("--to", nargs="+", type=float, metavar="X Y [YAW]", help="place [m, rad]")
     where.add_argument("--goals", metavar="PIPE", help="named pipe of places; made if it is not there")
