@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import sys
 import threading
 import time
 from collections.abc import Callable
 from pathlib import PurePath
+from types import FrameType
 from typing import Protocol
 
 WAITING_MODULES = ("threading.py", "selectors.py", "queue.py")
 """Files of Python's library in which a thread waits for another one."""
+
+
+def frames_of_threads() -> dict[int, FrameType]:
+    """What every thread is at, by its identifier.
+
+    Python before 3.12 holds a lock of its own meanwhile (gh-106883). Garbage collected then may run any code and let
+    another thread begin or end, which waits for that lock: all threads stand for ever. So none is collected.
+    """
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        return sys._current_frames()
+    finally:
+        if collects:
+            gc.enable()
 
 
 class GuardedSection(Protocol):
@@ -59,7 +76,7 @@ class Participant:
 
     def is_blocked(self) -> bool:
         """Whether it waits for another thread right now, by other means than the clock."""
-        frame = sys._current_frames().get(self.ident)
+        frame = frames_of_threads().get(self.ident)
         return frame is not None and PurePath(frame.f_code.co_filename).name in WAITING_MODULES
 
     def start_counting(self) -> None:

@@ -1,6 +1,7 @@
 """Threads of the user's own beside a SimClock: an error where they would hang, and nothing left of a closed server."""
 
 import gc
+import sys
 import threading
 import weakref
 from concurrent.futures import ThreadPoolExecutor
@@ -13,6 +14,7 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.participant import frames_of_threads
 from mbf_abstract.time.sim_clock import ClockDeadlock, SimClock
 
 NAMES_THE_WAY_OUT = r"waits on the clock for thread 'main'.*with clock\.outside\(\)"
@@ -108,3 +110,16 @@ def test_closing_moves_no_time():
     session.server.close()
     assert session.clock.now() == 1.0
     session.close()
+
+
+def test_no_garbage_is_collected_while_the_frames_of_threads_are_read(monkeypatch):
+    seen = []
+    monkeypatch.setattr(sys, "_current_frames", lambda: seen.append(gc.isenabled()) or {})
+    frames_of_threads()
+    assert seen == [False] and gc.isenabled()
+    gc.disable()
+    try:
+        frames_of_threads()
+        assert not gc.isenabled()
+    finally:
+        gc.enable()
