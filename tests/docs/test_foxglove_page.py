@@ -31,7 +31,7 @@ def test_every_panel_of_the_layout_is_configured_and_shown_once():
 def test_the_layout_draws_topics_that_are_served_and_publishes_goals_where_they_are_taken():
     (view,) = panels("3D")
     assert set(view["topics"]) <= set(TOPICS)
-    assert {view["publish"]["poseTopic"], view["publish"]["pointTopic"]} == set(INPUTS)
+    assert {view["publish"][f"{kind}Topic"] for kind in ("pose", "point", "poseEstimate")} == set(INPUTS)
     assert [one["topicToRender"] for one in panels("RosOut")] == ["/log"]
     assert {one["topicPath"] for one in panels("RawMessages")} <= set(TOPICS)
 

@@ -86,7 +86,7 @@ def test_near_far_distances_equal_dijkstra_bit_for_bit(seed, step):
 
 @given(seed=st.integers(0, 10**6), step=st.floats(0.01, 20.0))
 @settings(max_examples=40, deadline=None)
-def test_astar_finds_the_same_cost_and_looks_only_where_a_better_way_could_be(seed, step):
+def test_astar_finds_the_same_cost_and_looks_only_where_a_better_path_could_be(seed, step):
     vertices, offsets, neighbours, weights, blocked = random_grid_graph(seed)
     expected = heap_dijkstra(offsets, neighbours, weights, blocked, 0)
     distances = np.full(len(blocked), np.inf, np.float32)
