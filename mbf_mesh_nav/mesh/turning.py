@@ -18,7 +18,7 @@ from mbf_mesh_nav.arrays import Float32Array
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned
 from mbf_mesh_nav.kernels.motion.outline_sweep import sweep
 from mbf_mesh_nav.mesh.locate import SurfacePoint
-from mbf_mesh_nav.mesh.positions import vector_of
+from mbf_mesh_nav.mesh.positions import position_text, vector_of
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
 SPACING = 0.05
@@ -70,8 +70,8 @@ def swept_obstacle(
     ahead = turned(tangent(vector_of(pose.rotation[:, 0]), normal), normal, course)
     surface = mesh.vertices, mesh.faces, mesh.face_neighbours, mesh.face_normals
     step = command.speed * seconds, command.wz * seconds, steps
-    touched, (x, y, z) = sweep(*surface, ranks, place.face, point, ahead, outline, *step)
-    return f"an obstacle is in the way: the robot would turn into it at ({x:.2f}, {y:.2f}, {z:.2f})" if touched else ""
+    touched, corner = sweep(*surface, ranks, place.face, point, ahead, outline, *step)
+    return f"an obstacle is in the way: the robot would turn into it at {position_text(corner)}" if touched else ""
 
 
 def points_on(corners: Sequence[Sequence[float]]) -> FloatArray:

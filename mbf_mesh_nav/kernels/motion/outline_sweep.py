@@ -67,7 +67,7 @@ def sweep(
     turn: float,
     steps: int,
 ) -> tuple[bool, Vector]:
-    """Whether more of an outline touches lethal ground, or the border, on the way of a turn than before it.
+    """Whether more of an outline touches lethal ground, or the border, in the course of a turn than before it.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def sweep(
     outline : (n, 2) float64
         Bearing [rad] off the course and distance [m] of points on it.
     stride, turn : float
-        Way [m] and turn [rad] of one step.
+        Length [m] and turn [rad] of one step.
     steps : int
 
     Returns

@@ -17,7 +17,6 @@ from mbf_abstract.config.yaml_source import load_yaml
 from terrain.experiments.table1 import counting, plugin_wrappers, repetition
 from terrain.experiments.table1.conditions import CONDITIONS, outdoors, without_traffic
 from terrain.experiments.table1.counting import Leg, Tally
-from terrain.experiments.table1.environments import traffic
 from terrain.experiments.table1.environments import warehouse_environment as warehouse
 from terrain.experiments.table1.environments.outdoor_environment import OUTDOOR
 from terrain.experiments.table1.environments.world import load_world
@@ -65,14 +64,7 @@ def parameters_of(world_file: Path) -> dict[str, Any]:
         "navigation": load_yaml(warehouse.NAVIGATION).data,
         "world": json.loads(world.model_dump_json(exclude={"floor_plan", "map"})),
         "floor": hashlib.sha256(grid.occupied.tobytes() + grid.free.tobytes()).hexdigest(),
-        "traffic": [
-            traffic.STOP_DISTANCE,
-            traffic.SIDE_MARGIN,
-            traffic.DWELL,
-            traffic.SPEED_RANGE,
-            traffic.PHASE_RANGE,
-        ],
-        "lidar": [warehouse.LIDAR_RATE, warehouse.LIDAR_RANGE, warehouse.LIDAR_RAYS, warehouse.LIDAR_NOISE],
+        **warehouse.constants(),
     }
 
 

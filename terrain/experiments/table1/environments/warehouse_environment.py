@@ -15,7 +15,17 @@ import numpy as np
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
 from terrain.experiments.table1.conditions import Surroundings
-from terrain.experiments.table1.environments.traffic import CARRIER, TrafficRays, make_traffic, run_ahead
+from terrain.experiments.table1.environments.traffic import (
+    CARRIER,
+    DWELL,
+    PHASE_RANGE,
+    SIDE_MARGIN,
+    SPEED_RANGE,
+    STOP_DISTANCE,
+    TrafficRays,
+    make_traffic,
+    run_ahead,
+)
 from terrain.experiments.table1.environments.warehouse_world import WarehouseRobot, WarehouseWorld
 from terrain.experiments.table1.environments.world import World
 from terrain.experiments.table1.plugin_wrappers import SOURCE, wrap_plugins
@@ -32,6 +42,14 @@ NAVIGATION = Path(__file__).with_name("navigation.yaml")
 LIDAR_RATE, LIDAR_RANGE, LIDAR_RAYS, LIDAR_NOISE = 10.0, 8.0, 360, 0.01  # Hz, m, -, m
 STANDS_BELOW = 0.02  # m/s and rad/s
 TRAFFIC_STREAM, LIDAR_STREAM, POSE_STREAM = 1, 2, 3  # each part draws from its own generator
+
+
+def constants() -> dict[str, list[object]]:
+    """Constants of the code that decide what happens here, for the hash of an experiment's parameters."""
+    return {
+        "traffic": [STOP_DISTANCE, SIDE_MARGIN, DWELL, SPEED_RANGE, PHASE_RANGE],
+        "lidar": [LIDAR_RATE, LIDAR_RANGE, LIDAR_RAYS, LIDAR_NOISE],
+    }
 
 
 class WarehouseEnvironment(SimulationSession):

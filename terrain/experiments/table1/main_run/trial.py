@@ -13,7 +13,6 @@ from mbf_abstract.config.yaml_source import load_yaml
 from mbf_abstract.time.clock import wall_seconds
 from terrain.experiments.table1 import counting, plugin_wrappers, repetition
 from terrain.experiments.table1.counting import Leg, Tally
-from terrain.experiments.table1.environments import traffic
 from terrain.experiments.table1.environments import warehouse_environment as warehouse
 from terrain.experiments.table1.main_run.buildings import buildings, head_start
 from terrain.experiments.table1.main_run.conditions import CONDITIONS
@@ -44,14 +43,7 @@ def parameters_of(building: str, depot: Path | None) -> dict[str, Any]:
         "conditions": {name: asdict(condition) for name, condition in CONDITIONS.items()},
         "navigation": load_yaml(NAVIGATION).data,
         "building": buildings(depot)[building].parameters(),
-        "traffic": [
-            traffic.STOP_DISTANCE,
-            traffic.SIDE_MARGIN,
-            traffic.DWELL,
-            traffic.SPEED_RANGE,
-            traffic.PHASE_RANGE,
-        ],
-        "lidar": [warehouse.LIDAR_RATE, warehouse.LIDAR_RANGE, warehouse.LIDAR_RAYS, warehouse.LIDAR_NOISE],
+        **warehouse.constants(),
         "leg_time_limit": repetition.LEG_TIME_LIMIT,
         "useless_within": counting.USELESS_WITHIN,
         "latency": [plugin_wrappers.QUERY_CELL, plugin_wrappers.LATENCY_SPREAD],
