@@ -15,17 +15,8 @@ import numpy as np
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
 from terrain.experiments.table1.conditions import Surroundings
-from terrain.experiments.table1.environments.traffic import (
-    CARRIER,
-    DWELL,
-    PHASE_RANGE,
-    SIDE_MARGIN,
-    SPEED_RANGE,
-    STOP_DISTANCE,
-    TrafficRays,
-    make_traffic,
-    run_ahead,
-)
+from terrain.experiments.table1.environments import traffic
+from terrain.experiments.table1.environments.traffic import CARRIER, TrafficRays, make_traffic, run_ahead
 from terrain.experiments.table1.environments.warehouse_world import WarehouseRobot, WarehouseWorld
 from terrain.experiments.table1.environments.world import World
 from terrain.experiments.table1.plugin_wrappers import SOURCE, wrap_plugins
@@ -47,7 +38,13 @@ TRAFFIC_STREAM, LIDAR_STREAM, POSE_STREAM = 1, 2, 3  # each part draws from its 
 def constants() -> dict[str, list[object]]:
     """Constants of the code that decide what happens here, for the hash of an experiment's parameters."""
     return {
-        "traffic": [STOP_DISTANCE, SIDE_MARGIN, DWELL, SPEED_RANGE, PHASE_RANGE],
+        "traffic": [
+            traffic.STOP_DISTANCE,
+            traffic.SIDE_MARGIN,
+            traffic.DWELL,
+            traffic.SPEED_RANGE,
+            traffic.PHASE_RANGE,
+        ],
         "lidar": [LIDAR_RATE, LIDAR_RANGE, LIDAR_RAYS, LIDAR_NOISE],
     }
 
@@ -81,15 +78,15 @@ class WarehouseEnvironment(SimulationSession):
         self._goals = world.goals()
         self._moves = False
         grid = world.grid()
-        traffic = make_traffic(
+        others = make_traffic(
             world.routes, surroundings.robots, surroundings.polite, np.random.default_rng([seed, TRAFFIC_STREAM])
         )
-        self.robot = WarehouseRobot(WarehouseWorld(grid, traffic, self._report_contact), Pose.planar(*world.start))
-        run_ahead(traffic, head_start, self.robot.box)
+        self.robot = WarehouseRobot(WarehouseWorld(grid, others, self._report_contact), Pose.planar(*world.start))
+        run_ahead(others, head_start, self.robot.box)
         lidar = Lidar(
             self.robot,
             "lidar",
-            [StaticRays(*wall_surface(grid)), TrafficRays(traffic)],
+            [StaticRays(*wall_surface(grid)), TrafficRays(others)],
             LidarModel(CARRIER.lidar_position, planar_directions(LIDAR_RAYS), LIDAR_RATE, LIDAR_RANGE, LIDAR_NOISE),
             np.random.default_rng([seed, LIDAR_STREAM]),
         )
