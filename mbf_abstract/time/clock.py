@@ -16,6 +16,13 @@ from enum import IntEnum
 from types import TracebackType
 from typing import Protocol
 
+SIGNAL_PERIOD = 0.5
+"""Longest wait [s] of the main thread before Python may handle a signal.
+
+A signal ends a wait only where it comes during it, on that thread: one that comes just before is handled after the
+wait, one on Windows too. A Ctrl-C would then do nothing while the run waits for a goal.
+"""
+
 
 class Priority(IntEnum):
     """Who runs first among threads that wake at the same instant; smaller is earlier."""
@@ -122,9 +129,15 @@ class _WallThread:
 
 
 class _WallCondition(threading.Condition):
-    """A condition that takes any timeout; the operating system takes some 290 years, and infinity not at all."""
+    """A condition that takes any timeout; the operating system takes some 290 years, and infinity not at all.
+
+    Without a timeout the main thread may wake although nobody has notified it, see ``SIGNAL_PERIOD``.
+    """
 
     def wait(self, timeout: float | None = None) -> bool:
+        if timeout is None and threading.current_thread() is threading.main_thread():
+            super().wait(SIGNAL_PERIOD)
+            return True
         return super().wait(None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
 
 

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from mbf_abstract.time.clock import Priority, ThreadDetached
+from mbf_abstract.time.clock import SIGNAL_PERIOD, Priority, ThreadDetached
 from mbf_abstract.time.participant import Participant
 
 STALLED_AFTER = 5.0
@@ -254,6 +254,9 @@ class LockstepScheduler:
     def _await_baton(self, me: Participant) -> None:
         if me.foreign:
             self._await_beside(me)
+        elif me is self.founder:  # mostly the main thread, which alone handles signals
+            while not me.baton.acquire(timeout=SIGNAL_PERIOD):
+                pass
         else:
             me.baton.acquire()
         if me.sections:

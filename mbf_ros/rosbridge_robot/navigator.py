@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +21,12 @@ from mbf_abstract.server.factory import read_config
 from mbf_ros.robot_inputs import RobotInputs
 from mbf_ros.ros2.robot import Frames
 from mbf_ros.ros2.robot_navigation import WATCH_PERIOD, RobotNavigation
+from mbf_ros.rosbridge_robot.connection import NotConnectedError
 from mbf_ros.rosbridge_robot.dialing import check_address
 from mbf_ros.rosbridge_robot.goals import OfferedGoals
 from mbf_ros.rosbridge_robot.links import LinkArrivals, RobotLinks
 from mbf_ros.rosbridge_robot.options import RobotOptions
-from mbf_ros.rosbridge_robot.outputs import CommandTopic, ShownTopics
+from mbf_ros.rosbridge_robot.outputs import CommandTopic, Settling, ShownTopics
 from mbf_ros.rosbridge_robot.robot_time import RobotTime
 from mbf_ros.rosbridge_robot.topics import Reports, RobotTopics
 from mbf_ros.sensor_options import used_sensors
@@ -90,6 +91,7 @@ class RobotNavigator(RobotNavigation):
         self._time = RobotTime(options.time, self._real_time, self._arrivals)
         self._time.listen(self._topics)
         self._served = threading.Event()
+        self._settling = Settling(self._real_time.now)
         self._closing.callback(self._links.close)
 
     def serve(self, server_class: Any, config: Config) -> None:
@@ -146,6 +148,8 @@ class RobotNavigator(RobotNavigation):
             self.session.navigator.server.runtime.gate.ask_stop(problem)
         if problem and self._served.is_set() and name == self._links.data.name:
             self._goals.abandon(f"the connection to the robot was lost: {problem}")
+        if not problem and name == self._links.commands.name:
+            self._settling.begin()
         self._note(EventKind.CUSTOM, f"{name}: {problem or 'connected again'}")
 
     def _report(self, text: str) -> None:
@@ -177,8 +181,12 @@ class RobotNavigator(RobotNavigation):
 
     def _watch(self) -> None:
         self._time.follow_calendar()
-        if not self._links.commands.problem:  # else zero cannot be sent; the gate tries again every command_timeout
-            super()._watch()
+        if self._links.commands.problem:  # zero cannot be sent; the gate tries again every command_timeout
+            return
+        super()._watch()
+        if self._settling.is_due(is_heard=not self._robot.problem()):
+            with suppress(NotConnectedError):
+                self._command_topic.repeat_zero()
 
     # ------------------------------------------------------------------------------------------- the end
     def _wait_for_results(self) -> bool:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
+from mbf_abstract.drive.commands import stands_still
 from mbf_abstract.geometry import Command, Twist
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import Clock
@@ -18,6 +21,11 @@ from mbf_ros.rosbridge_robot.connection import Connection, NotConnectedError
 
 CMD_VEL = "/cmd_vel"
 PERIOD = 0.1  # s between two looks at what is new
+ZERO_PERIOD = 0.5  # s between two zeros after a connection was opened anew
+SETTLING_TIME = 10.0
+"""Time [s] for which they are repeated once all that the robot must send has come again."""
+LONGEST_SETTLING = 60.0
+"""Longest time [s] for which they are repeated: somebody else may have to drive a robot that sends nothing."""
 SHOWN = (PLAN, GOAL, LOCAL_PLAN, FOOTPRINT, DIAGNOSTICS, LOCALIZATION)
 """What is published although nobody is known to listen; maps would fill the connection."""
 
@@ -26,7 +34,8 @@ class CommandTopic:
     """Publishes commands as Twist, or as TwistStamped in the robot's frame.
 
     Only the newest command waits to be sent. What waited when the connection was lost is never sent; on the next one
-    zero comes first.
+    zero comes first. Who listens on the robot learns of a server that has started anew only after a while, and until
+    then hears nothing; so zero is to be repeated, see ``repeat_zero``.
     """
 
     def __init__(
@@ -39,10 +48,20 @@ class CommandTopic:
     ) -> None:
         self._connection, self._clock, self._context = connection, clock, context
         self._stamped, self._frame, self._was_connected = stamped, robot_frame, False
+        self._lock = threading.Lock()
+        self._is_moving = False
 
     def publish(self, command: Command) -> None:
         """Publish a command; does not wait. Raises NotConnectedError."""
-        self._connection().newest(CMD_VEL, self._publication(command))
+        with self._lock:
+            self._is_moving = not stands_still(command)
+            self._connection().newest(CMD_VEL, self._publication(command))
+
+    def repeat_zero(self) -> None:
+        """Publish zero once more, unless the last command was a motion; does not wait. Raises NotConnectedError."""
+        with self._lock:
+            if not self._is_moving:
+                self._connection().newest(CMD_VEL, self._publication(Twist()))
 
     def wait_until_sent(self, seconds: float) -> None:
         """Wait until the last command has left, for at most ``seconds``."""
@@ -61,6 +80,37 @@ class CommandTopic:
         value, now = command_twist(command), self._clock.now()
         message = twist_stamped(value, self._frame, now, self._context()) if self._stamped else twist(value)
         return frame("publish", topic=CMD_VEL, msg=message)
+
+
+class Settling:
+    """When to repeat zero after a connection was opened anew.
+
+    Parameters
+    ----------
+    now : callable
+        Real time [s].
+    """
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self._end = self._longest = self._due = -math.inf
+
+    def begin(self) -> None:
+        """Begin: a connection was opened."""
+        self._due = self._now()
+        self._end, self._longest = self._due + SETTLING_TIME, self._due + LONGEST_SETTLING
+
+    def is_due(self, is_heard: bool) -> bool:
+        """Whether to repeat zero now; ``is_heard``: all that the robot must send comes. To be called often."""
+        now = self._now()
+        if now >= min(self._end, self._longest):
+            return False
+        if not is_heard:
+            self._end = now + SETTLING_TIME
+        if now < self._due:
+            return False
+        self._due = now + ZERO_PERIOD
+        return True
 
 
 class ShownTopics:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.system.ros2.environments import JAZZY, KILTED, clean_variables, free_domain
+from tests.system.ros2.environments import JAZZY, KILTED, clean_variables, end_with_parent, free_domain
 
 PEERS = Path(__file__).parent / "peers"
 WITHIN = 300.0  # s; nothing waits that long unless it fails
@@ -41,6 +41,7 @@ class Peer:
             stdout=subprocess.PIPE,
             stderr=self._log,
             text=True,
+            preexec_fn=end_with_parent,
         )
         self.lines = []
         self._condition = threading.Condition()

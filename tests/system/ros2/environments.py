@@ -3,14 +3,17 @@
 The wheels start each Python of their environment anew with other library paths, so this one has none of them.
 """
 
+import ctypes
 import fcntl
 import hashlib
 import os
 import platform
 import re
 import shutil
+import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import requires
 from pathlib import Path
@@ -20,6 +23,9 @@ from mbf_ros.ros2.interfaces.definitions import PACKAGES, interface_files
 
 OLDEST = (3, 10)  # Python for which there are wheels
 MBF = "from mbf_abstract.cli import main; main()"
+LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
+PR_SET_PDEATHSIG = 1
+BUILD_TIME = 780  # s; a test that waits longer is ended by its own timeout, without a text
 DOMAINS = range(1, 101)  # domains of DDS whose ports are not those that Linux gives to other programs
 
 
@@ -54,8 +60,7 @@ class Distribution:
         root = Path(os.environ.get("MBF_ROS_ENV") or Path.home() / ".cache" / "mbf-flex" / "ros2")
         root.mkdir(parents=True, exist_ok=True)
         folder = root / self.key()
-        with open(root / f"lock-{self.name}", "w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)  # the processes of pytest-xdist come here together
+        with locked(root / f"lock-{self.name}", BUILD_TIME):  # the processes of pytest-xdist come here together
             if not (folder / "complete").exists():
                 shutil.rmtree(folder, ignore_errors=True)
                 self._build(folder)
@@ -73,7 +78,7 @@ class Distribution:
             ([*pip, "install", "--quiet", "--no-compile", "--no-warn-conflicts", *self.requirements], ours),
             (interfaces, variables),
         ):
-            subprocess.run(command, check=True, env=environment, timeout=900)
+            subprocess.run(command, check=True, env=environment, timeout=900, preexec_fn=end_with_parent)
 
 
 def _extra():
@@ -105,6 +110,24 @@ def clean_variables(folder, domain=0):
     paths = [str(Path(folder) / "interfaces"), *(path for path in sys.path if path)]
     discovery = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     return {**kept, **discovery, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def end_with_parent():
+    """Have the kernel kill this process when its parent is gone, in whatever way: nothing of killed tests is left."""
+    LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+@contextmanager
+def locked(path, seconds):
+    """Hold the lock on a file; raises TimeoutError, which names the holder, where it is not free within so long."""
+    with open(path, "a+") as lock:
+        wait = ["flock", "--timeout", str(seconds), str(lock.fileno())]  # locks what we have open, for as long as we do
+        if subprocess.run(wait, pass_fds=[lock.fileno()]).returncode:
+            raise TimeoutError(f"{path} has been locked for {seconds} s by process {path.read_text()}; end it, or wait")
+        lock.truncate(0)
+        lock.write(f"{os.getpid()}, {' '.join(sys.argv)}")
+        lock.flush()
+        yield
 
 
 def free_domain(root, closing):

@@ -1,5 +1,6 @@
 """``mbf bridge connect`` to the rosbridge of a robot on Jazzy: rosbridge-server-rs, of which rclpy is a client."""
 
+import signal
 import socket
 import sys
 from contextlib import ExitStack
@@ -103,7 +104,10 @@ def test_after_the_rosbridge_is_killed_the_robot_stands_until_the_next_goal_whic
     robot.rosbridge.kill()
     robot.robot.wait_until_it_stands(heard)
     heard = len(robot.robot.lines)
+    robot.robot.process.send_signal(signal.SIGSTOP)  # so that it does not hear the first zero through the new server
     robot.start_rosbridge()
+    robot.navigator.wait_for(lambda line: "waiting: no message" in line.get("text", ""), connected)
+    robot.robot.process.send_signal(signal.SIGCONT)
     robot.navigator.wait_for(lambda line: "is ready" in line.get("text", ""), connected)
     assert robot.robot.wait_for(lambda line: "speed" in line, heard)["speed"] == 0.0
     robot.client.kill()

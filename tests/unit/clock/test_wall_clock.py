@@ -1,5 +1,8 @@
 """WallClock and Stopwatch. Nothing here waits for longer than a few milliseconds, and nothing asserts a duration."""
 
+import signal
+import threading
+
 import pytest
 
 from mbf_abstract.time.clock import Stopwatch, WallClock, wall_seconds
@@ -43,6 +46,30 @@ def test_a_wait_without_a_notification_times_out():
     condition = WallClock().condition()
     with condition:
         assert condition.wait(0.001) is False
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="signals of this system are not sent to threads")
+@pytest.mark.parametrize("kind", [WallClock, SimClock])
+def test_a_signal_that_does_not_end_the_wait_of_the_main_thread_is_handled_during_it_nevertheless(kind):
+    clock, handled, ended = kind(), threading.Event(), []
+    condition, before = clock.condition(), signal.signal(signal.SIGINT, lambda number, frame: handled.set())
+
+    def interrupt():
+        with clock.outside():
+            signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+            in_time = handled.wait(20.0)
+        with condition:
+            ended.append(in_time)
+            condition.notify_all()
+
+    try:
+        with condition:
+            clock.spawn(interrupt, "interrupt")
+            while not ended:
+                condition.wait()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert ended == [True]
 
 
 def test_guarded_and_outside_change_nothing():

@@ -13,8 +13,15 @@ pytestmark = pytest.mark.timeout(300)
 
 PAD = "document.getElementById('mbf-stick')"
 MIDDLE = f"(() => {{ const r = {PAD}.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
+HOLDS = f"{PAD}.firstChild.style.background === 'rgb(31, 111, 235)'"  # as the page shows it
 META = 4
 DEADLINE = 120.0  # s
+SLOW_SOCKET = """(() => {
+  const send = WebSocket.prototype.send;
+  WebSocket.prototype.send = function (data) { this.sent = performance.now(); return send.call(this, data); };
+  Object.defineProperty(WebSocket.prototype, 'bufferedAmount',
+                        { get() { return performance.now() - this.sent < 50 ? 1 : 0; } });
+})()"""  # what was sent needs 50 ms to leave, so that a report of the stick is left to the next heartbeat
 
 
 class Noted:
@@ -50,16 +57,21 @@ def served():
         yield noted, access.address(server.get_port(), Role.STEER)
 
 
-async def changes_so_far(page, noted):
-    """What has happened to the stick, with all that the page has sent until now."""
-    looks = noted.looks
-    await page.press("Free")  # messages come in their order
-
-    async def until_it_has_come():
-        while noted.looks == looks:
+async def until(holds):
+    async def poll():
+        while not holds():
             await asyncio.sleep(0.01)
 
-    await asyncio.wait_for(until_it_has_come(), DEADLINE)
+    await asyncio.wait_for(poll(), DEADLINE)
+
+
+async def changes_so_far(page, noted):
+    """What has happened to the stick by what the page shows now, with all that it has sent until now."""
+    is_held = await page.evaluate(HOLDS)
+    await until(lambda: (noted.changes[-1:] == ["held"]) == is_held)  # a report may wait for the next heartbeat
+    looks = noted.looks
+    await page.press("Free")  # messages come in their order
+    await until(lambda: noted.looks > looks)
     return list(noted.changes)
 
 
@@ -74,6 +86,7 @@ def test_what_may_keep_a_release_from_the_page_lets_go_of_the_stick_and_only_a_n
     async def steer(page):
         await page.open(address)
         await page.wait_for(f"{PAD} !== null", DEADLINE)
+        await page.evaluate(SLOW_SOCKET)
         await mouse(page, "mousePressed", "right")
         await mouse(page, "mouseReleased", "right")
         yield await changes_so_far(page, noted)

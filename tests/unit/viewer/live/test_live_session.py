@@ -1,7 +1,7 @@
 """A run with a page that nobody looks at is the same run; Ctrl-C ends it in order."""
 
-import os
 import signal
+import threading
 import urllib.request
 from functools import partial
 
@@ -54,7 +54,7 @@ def test_ctrl_c_ends_a_run_that_waits_for_goals_and_its_results_are_written(mead
     def press(progress):
         if progress.state == "waiting" and progress.time > 5.0 and not pressed:
             pressed.append(progress.time)
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.pthread_kill(threading.get_ident(), signal.SIGINT)  # it does not end the wait of the main thread
 
     result = run(meadow, tmp_path, watch=page(port=18200, speed=0.0), stay=True, on_progress=press)
 
