@@ -51,8 +51,6 @@ class DriveLog:
         Frame of poses, paths, scans and maps.
     outline : (m, 2) float64
         The robot's footprint [m], counter-clockwise.
-    start : Pose
-    goals : tuple of Pose
     times : (n,) float64
         Time of each sample [s], increasing.
     poses : (n, 7) float64
@@ -61,10 +59,8 @@ class DriveLog:
         Measured and commanded vx [m/s], vy [m/s], wz [rad/s] in the base frame.
     paths : list of (time, (m, 3) float64)
         Plans, from the time they came.
-    scans : list of LoggedScan
     maps : list of (time, MapView)
         The map at several times.
-    events : tuple of Event
     outcome : int or None
         Of the last goal.
     message : str

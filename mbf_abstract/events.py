@@ -77,7 +77,6 @@ class Event:
     ----------
     time : float
         Time [s] of the injected clock, rounded to a nanosecond.
-    kind : EventKind
     source : str
         Who reports it, e.g. ``"get_path"``, ``"velocity_gate"`` or a plugin's name.
     data : mapping of str to JSON value

@@ -84,7 +84,6 @@ class InnerPlugin:
 
     Attributes
     ----------
-    kind : PluginKind
     type_key, block_key : str
         Parameters of the outer plugin that hold the type and the parameter block of the inner one.
     """
@@ -142,7 +141,6 @@ class PlanRequest:
 
     Attributes
     ----------
-    start, goal : Pose
     dist_tolerance : float
         How far [m] from the goal a path may end if the goal itself cannot be reached; 0 = exactly there.
     angle_tolerance : float

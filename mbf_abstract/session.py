@@ -47,7 +47,6 @@ class NavigationSession:
 
     Attributes
     ----------
-    clock : Clock
     events : EventBus
     memory : MemorySink
         The events so far.

@@ -50,7 +50,6 @@ def check_layer(
 
     Parameters
     ----------
-    layer_class : type
     parameters : LayerParameters, optional
         The class's defaults if not given.
     background : Costmap, optional

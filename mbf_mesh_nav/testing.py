@@ -40,7 +40,6 @@ def check_layer(
 
     Parameters
     ----------
-    layer_class : type
     mesh_map : MeshMap
         A mesh on which the layer has an effect.
     parameters : LayerParameters, optional

@@ -32,7 +32,6 @@ class Output(NamedTuple):
     ----------
     topic, type : str
         A topic that begins with ``~/`` belongs to the node, one without a slash to its namespace.
-    quality : Quality
     depth : int
         How many messages wait for a slow listener.
     always : bool
@@ -64,17 +63,12 @@ class MapMessages(ABC):
 
     Parameters
     ----------
-    server : AbstractNavigationServer
     name : str
         Of a view of the server.
     context : callable
         How stamps and frames relate to ours, now.
     audience : callable
         Who listens to a topic.
-
-    Attributes
-    ----------
-    outputs : tuple of Output
     """
 
     outputs: tuple[Output, ...]

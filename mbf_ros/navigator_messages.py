@@ -47,7 +47,6 @@ class NavigatorMessages:
 
     Parameters
     ----------
-    session : NavigationSession
     real_time : Clock
         By which the periods count.
     context : callable

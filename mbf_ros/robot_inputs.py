@@ -46,8 +46,6 @@ class Input:
 
     Attributes
     ----------
-    topic, type : str
-    quality : Quality
     taker : callable
         Uses a message; raises ValueError or TransformError where it means nothing, or is refused.
     depth : int

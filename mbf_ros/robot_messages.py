@@ -40,7 +40,6 @@ class RobotMessages:
     session : NavigationSession
         Its server knows the robot, its transforms and its scans. A sensor without a mount sits where its first scan
         began; its scans are published where there is one sensor at most.
-    context : MessageContext
     is_wanted : callable
         Whether somebody listens to a topic; scans that nobody wants are not converted.
     """

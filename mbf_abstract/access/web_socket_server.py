@@ -94,11 +94,8 @@ class WebSocketServer(Generic[AnyVisitor]):
 
     Parameters
     ----------
-    service : Service
     events : EventBus
         Learns who comes and goes, and who is refused.
-    options : ServerOptions
-    offer : Offer
 
     Attributes
     ----------

@@ -23,7 +23,6 @@ class PluginAction(Action[G, R, F], Generic[G, R, F, P]):
 
     Attributes
     ----------
-    kind : PluginKind
     patience_outcome : int
         Of a goal whose plugin, driver or map did not come back within patience and grace.
     """

@@ -154,7 +154,6 @@ def validate_config(
 
     Parameters
     ----------
-    raw : RawConfig
     sections : mapping of str to type
         Map sections of the server, by key. A model with a field ``layers`` has a block per layer inside its section.
     registry : PluginRegistry

@@ -59,7 +59,6 @@ def validate(
 
     Parameters
     ----------
-    model : subclass of ParameterModel
     data : object
         The block, usually a mapping; None counts as an empty block.
     document : YamlDocument

@@ -26,7 +26,6 @@ class Lease:
 
     Attributes
     ----------
-    owner : str
     paused : bool
         Whether commands are dropped until ``resume``.
     problem : str

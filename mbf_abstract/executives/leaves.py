@@ -96,10 +96,8 @@ class GetPath(ActionLeaf):
 
     Parameters
     ----------
-    name : str
     planner : str
         Empty = the first one loaded.
-    target : Pose, optional
     dist_tolerance, angle_tolerance : float
         As in ``GetPathGoal`` [m, rad].
     slot : int

@@ -25,7 +25,6 @@ class MapCheck(Leaf):
 
     Parameters
     ----------
-    name : str
     worst : CellState
         The worst state that still passes.
     """

@@ -35,7 +35,6 @@ class State:
 
     Attributes
     ----------
-    node : Behaviour
     transitions : mapping
         From ``Status.SUCCESS``, ``Status.FAILURE`` and, before the latter, codes of the mission's last failure.
     """

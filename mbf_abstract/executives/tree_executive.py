@@ -48,7 +48,6 @@ class TreeExecutive:
     ----------
     tree : Behaviour
         Any ``py_trees`` tree; ours need a mission, which ``run`` gives them.
-    navigator : Navigator
     period : float
         Time between two ticks [s].
 

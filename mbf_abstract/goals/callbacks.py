@@ -46,7 +46,6 @@ class CallbackThread:
 
         Parameters
         ----------
-        callback : callable
         newest_of : hashable, optional
             Who takes it, where only the newest matters: it replaces one of the same taker that is still queued, in
             its place, and is dropped while the taker is blocked.

@@ -24,10 +24,8 @@ class GetPathGoal:
 
     Attributes
     ----------
-    target_pose : Pose
     start_pose : Pose, optional
         None = from where the robot is.
-    planner : str
     dist_tolerance, angle_tolerance : float, optional
         How far [m, rad] from the target the path may end where the target itself cannot be reached; 0 = exactly there,
         None = the server's tolerances (with a ``goal_area`` 0: the area is tolerance enough).
@@ -129,7 +127,6 @@ class FollowWaypointsGoal:
 
     Attributes
     ----------
-    waypoints : tuple of Pose
     loops : int
         How often the whole list is visited; ValueError if it is not at least 1.
     stop_on_failure : bool

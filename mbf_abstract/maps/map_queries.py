@@ -108,7 +108,6 @@ class MapQueries:
 
         Parameters
         ----------
-        path : Path
         within_time : float
             How far ahead [s] the places of moving objects count.
 

@@ -32,7 +32,6 @@ class NavigationMap(ABC):
 
     Attributes
     ----------
-    frame_id : str
     layers : mapping of name to layer
         Each layer has its ``parameters``.
     """

@@ -37,7 +37,6 @@ class ScanIntake:
     ----------
     runtime : Runtime
         Of the server.
-    maps : mapping of name to ServedMap
 
     Attributes
     ----------

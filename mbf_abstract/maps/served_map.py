@@ -32,7 +32,6 @@ class ServedMap(Generic[Map]):
 
     Parameters
     ----------
-    navigation_map : NavigationMap
     runtime : Runtime
         Of the server.
     name : str

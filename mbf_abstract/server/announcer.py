@@ -38,7 +38,6 @@ class Announcer:
         Its plugins know the announcements of the other robots from now on.
     name : str
         Of the robot; no other robot has it.
-    channel : Channel
     """
 
     def __init__(self, server: AbstractNavigationServer, name: str, channel: Channel) -> None:

@@ -41,12 +41,10 @@ class ControlCycle:
 
     Attributes
     ----------
-    request : ControlRequest
     tracker : PathTracker
         The plan and the progress on it.
     costmap : Costmap
         Snapshot of this cycle.
-    footprint : FootprintCheck
     goal_tolerance : float
         Distance [m] from the goal that counts as arrived.
     speed_limit : float

@@ -68,7 +68,6 @@ class Rollouts:
         Whether the path is driven in reverse here.
     goal_tolerance : float
         Distance [m] from the goal that counts as arrived.
-    costmap : Costmap
     robot : (x, y)
         The robot's position [m] in the map, to look cells up.
     discs : (k,) float32

@@ -30,13 +30,7 @@ REPORTED_WIDTH = 300
 
 
 class MapError(Exception):
-    """A map file that cannot be used.
-
-    Attributes
-    ----------
-    file : pathlib.Path
-    reason : str
-    """
+    """A map file that cannot be used."""
 
     def __init__(self, file: Path, reason: str) -> None:
         super().__init__(f"{file}: {reason}")

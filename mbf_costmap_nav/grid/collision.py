@@ -69,7 +69,6 @@ def footprint_costs(costmap: Costmap, footprint: Footprint, x: float, y: float, 
 
     Parameters
     ----------
-    costmap : Costmap
     footprint : Footprint
         With fewer than three points only the cell of the centre counts.
     x, y, yaw : float

@@ -155,7 +155,6 @@ class Costmap(GridGeometry):
         Side of a cell [m].
     origin_x, origin_y : float
         Lower-left corner of cell (0, 0) [m] in ``frame_id``.
-    frame_id : str
     stamp : float
         Time of the last update [s].
     version : int

@@ -27,7 +27,6 @@ class FootprintCheck:
 
     Attributes
     ----------
-    footprint : Footprint
     samples : (n, 2) float64
         Footprint samples in the base frame [m], outline first; the origin alone for a point robot.
     """

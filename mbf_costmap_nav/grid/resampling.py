@@ -30,8 +30,6 @@ def sample_costmap(
 
     Parameters
     ----------
-    source : Costmap
-    geometry : GridGeometry
     box : CellBox
         Cells of ``geometry`` to fill.
     outside : int

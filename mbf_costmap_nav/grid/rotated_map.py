@@ -31,7 +31,6 @@ def axis_aligned_shape(
         Of the image [cells].
     yaw : float
         Rotation [rad] about the corner of cell (0, 0).
-    max_cells : int
 
     Returns
     -------
@@ -68,7 +67,6 @@ def rotated_to_axes(
         Bottom row first.
     yaw : float
         Rotation [rad] about the corner of cell (0, 0).
-    max_cells : int
 
     Raises
     ------

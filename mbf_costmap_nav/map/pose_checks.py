@@ -44,7 +44,6 @@ def pose_check(costmap: Costmap, footprint: Footprint, query: PlaceQuery = AS_CO
 
     Parameters
     ----------
-    costmap : Costmap
     footprint : Footprint
         Padded or not, as the caller wishes; the query's choices of map and padding are not looked at here. Without
         corners only the cell of the pose counts.

@@ -44,7 +44,6 @@ class ObservationBuffer:
     ----------
     name : str
         Name of the source, for messages.
-    parameters : SourceParameters
     """
 
     def __init__(self, name: str, parameters: SourceParameters) -> None:

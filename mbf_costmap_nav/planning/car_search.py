@@ -42,7 +42,6 @@ class Driving:
     ----------
     radius : float
         Of the tightest curve [m].
-    reversing : bool
     cost_factor : float
         Relative extra length of a path through cells of cost 252.
     reverse_penalty, turning_penalty : float

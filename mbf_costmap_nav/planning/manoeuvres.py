@@ -84,17 +84,14 @@ class Manoeuvres:
 
     Attributes
     ----------
-    costmap : Costmap
     footprint : Footprint
         Padded, as the controllers check it.
     min_turning_radius : float
         Of the robot [m]; 0 = it turns on the spot.
     cost_factor : float
         Relative extra length of a path through cells of cost 252.
-    allow_unknown : bool
     max_states : int
         The search of a piece gives up after so many; 0 = no manoeuvres.
-    token : CancelToken
     """
 
     costmap: Costmap

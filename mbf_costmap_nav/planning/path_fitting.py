@@ -39,10 +39,8 @@ class PathFitting:
         Its padded outline is the one that must fit.
     snapshot : Costmap
         Of it; the one the plan is made on.
-    parameters : GridPlannerParameters
     min_turning_radius : float
         Of the robot [m]; 0 = it turns on the spot.
-    token : CancelToken
     manoeuvres : bool
         Whether a path may be changed where the outline does not fit.
     """

@@ -67,7 +67,6 @@ class SearchGrid:
 
     Attributes
     ----------
-    costmap : Costmap
     padded : PaddedGrid
         Its costs and their traversal, 1 for free, inf for blocked.
     token : CancelToken

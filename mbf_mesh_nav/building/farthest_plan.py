@@ -26,7 +26,6 @@ class FarthestPlan:
     ----------
     text : str
         What came out, one sentence.
-    success : bool
     start, goal : tuple of float
         x, y and z [m]; both zero where no vertex is free.
     free_share : float

@@ -32,7 +32,6 @@ class MapFacts:
         Distance between the vertices.
     density : float
         Points of a square metre of surface, the median of all cells.
-    vertices, faces : int
     area, stacked_area : float
         Of the surface; of the places with another surface above.
     filled_area, obstacle_area, small_area : float

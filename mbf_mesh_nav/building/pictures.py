@@ -23,12 +23,7 @@ LOW, MIDDLE, HIGH = (52, 94, 141), (245, 240, 220), (166, 70, 46)
 
 
 class PlanView:
-    """A picture of a grid from above, north at the top.
-
-    Parameters
-    ----------
-    grid : Grid
-    """
+    """A picture of a grid from above, north at the top."""
 
     def __init__(self, grid: Grid) -> None:
         self._grid = grid

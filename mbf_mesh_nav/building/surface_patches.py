@@ -25,7 +25,6 @@ class Grid:
         x and y of the lower left corner [m].
     cell : float
         Side of a cell [m].
-    columns, rows : int
     """
 
     corner: FloatArray
@@ -62,7 +61,6 @@ class SurfacePatches:
 
     Attributes
     ----------
-    grid : Grid
     cells, kinds : int32
         The cell of a patch, and what it is (see ``kernels.building.columns``).
     firsts, ends : int64

@@ -173,7 +173,6 @@ def build_mesh_map(
 
     Parameters
     ----------
-    parameters : MeshMapParameters
     layer_blocks : mapping, optional
         Layer name -> parameters, as read from the configuration or validated.
     vertices, faces : (V, 3) float, (F, 3) int, optional

@@ -21,12 +21,10 @@ class Finding:
 
     Attributes
     ----------
-    name : str
     text : str
         A sentence with the count.
     indices : (n,) int64
         The caller's numbers of the vertices or faces concerned; empty if the finding is about none of them.
-    repaired : bool
     harmless : bool
         Whether a mesh with it is taken although it was not repaired.
     """
@@ -74,7 +72,6 @@ class MeshError(ValueError):
     ----------
     file : str
         The file, or "arrays".
-    reasons : list of str
     hint : str
         How the mesh could be used all the same; empty if it cannot.
     """

@@ -28,7 +28,6 @@ def build_vertex_graph(topology: MeshTopology, costs: Float32Array, edge_weights
 
     Parameters
     ----------
-    topology : MeshTopology
     costs : (V,) float32
         Becomes the node attribute ``cost``; ``position`` is the (x, y, z) tuple [m].
     edge_weights : (2E,) float32

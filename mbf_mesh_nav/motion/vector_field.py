@@ -25,7 +25,6 @@ class VectorField:
         Unit vectors in the surface, in the map's internal numbering; zero where the goal cannot be reached from.
     distances : (V,) float32
         Weighted distance [m] to the goal, inf where it cannot be reached from.
-    goal_face : int
     goal : (3,) float64
         Where the field leads to [m].
     topology : MeshTopology

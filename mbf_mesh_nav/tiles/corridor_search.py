@@ -43,8 +43,6 @@ class TiledPlan:
 
     Attributes
     ----------
-    outcome : GetPathOutcome
-    message : str
     positions, normals : (n, 3) float64
         Of the path, from start to goal [m]; none without one.
     cost : float

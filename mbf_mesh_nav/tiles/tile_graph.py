@@ -29,7 +29,6 @@ class TileGraph:
     ----------
     snapshot : MeshSnapshot
         Costs, lethal flags and edge weights.
-    graph : SearchGraph
     mean_edge, longest_edge : float
         Lengths [m].
     """

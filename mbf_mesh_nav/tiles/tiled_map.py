@@ -39,7 +39,6 @@ class TiledMap:
 
     Parameters
     ----------
-    folder : path
     profile : str
         Name of a cost profile; empty = the map's first.
     memory : float

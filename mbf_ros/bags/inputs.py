@@ -44,18 +44,13 @@ class BagInputs:
 
     Parameters
     ----------
-    bag : Bag
-    topics : BagTopics
-    time : RecordedTime
     server : MapServer
         Its transform buffer and its maps are fed.
-    robot : RecordedRobot
     odometry_as_transform : bool
         Take the poses of odometry for the transform from its frame to its child frame.
 
     Attributes
     ----------
-    topics : dict of str to TopicStatistics
     frames : dict of str to FrameStatistics
         By child frame.
     scan_listeners : list of callables

@@ -27,8 +27,6 @@ class Observation:
 
     Parameters
     ----------
-    server : MapServer
-    robot : RecordedRobot
     map_name : str
         Which of ``server.map_views``; the first one if empty.
     began, duration : float

@@ -21,8 +21,6 @@ class ReplayedPlan:
 
     Parameters
     ----------
-    navigator : Navigator
-    place : Place
     planner : str
         Name; the first one if empty.
     shown_frame : str

@@ -39,10 +39,8 @@ class Bag:
 
     Parameters
     ----------
-    path : Path
     reader : object
         Of rosbags, open.
-    is_ros1 : bool
 
     Attributes
     ----------

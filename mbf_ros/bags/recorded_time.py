@@ -29,7 +29,6 @@ class RecordedTime:
 
     Parameters
     ----------
-    bag : Bag
     topics : BagTopics
         Whose stamps are looked at.
     global_frame : str

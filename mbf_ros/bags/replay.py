@@ -86,8 +86,6 @@ class Replayed:
 
     Attributes
     ----------
-    log : DriveLog
-    duration : float
     stamp_shift : float
         By how much stamps were moved onto the clock of the recording.
     topics, frames

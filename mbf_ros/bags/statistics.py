@@ -73,7 +73,6 @@ class TopicStatistics:
         Its type, and what it is replayed as; empty where it is not.
     recorded : Intervals
         When its messages were recorded.
-    delays : Delays
     dropped : Counter of str
         How many messages were not used, by reason.
     dropped_by_map : Counter of str

@@ -23,8 +23,6 @@ class BagMessage(NamedTuple):
     ----------
     time : int
         ROS time [ns].
-    topic, type : str
-    message : dict
     latched : bool
         Whether late subscribers get the last one; the same for all messages of a topic.
     """

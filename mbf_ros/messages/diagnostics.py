@@ -31,11 +31,8 @@ def diagnostics(
 
     Parameters
     ----------
-    server : AbstractNavigationServer
     inputs : mapping of str to str
         What is wrong with each topic that must come, empty for one that comes, by topic.
-    stamp : float
-    context : MessageContext
     """
     states = [*_inputs(inputs), *_maps(server), *_plugins(server), _gate(server)]
     return {"header": context.header("", stamp), "status": states}

@@ -107,7 +107,6 @@ def completed(type_name: str, values: object, where: str = "") -> Message:
 
     Parameters
     ----------
-    type_name : str
     values : mapping
         As it came from JSON, in which null stands for NaN and a list of bytes may be base64, or from CBOR. Times may
         have the fields of ROS 1 (``secs``, ``nsecs``), and headers a ``seq``, which is dropped.

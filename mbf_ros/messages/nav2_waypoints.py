@@ -86,8 +86,6 @@ def waypoints_of_client(
         Ours.
     first : int
         The ``goal_index`` of the client's, where ours begins.
-    shown : FollowWaypointsFeedback or FollowWaypointsResult
-    context : MessageContext
     """
     count = len(goal.waypoints)
 
@@ -134,12 +132,10 @@ def waypoint_statuses(
 
     Parameters
     ----------
-    goal : MoveBaseGoal
     feedback : MoveBaseFeedback, optional
         The newest one; None where the robot has not set out.
     result : MoveBaseResult, optional
         None while the goal runs. Where it failed, the pose that the robot was on its way to is the one that it missed.
-    context : MessageContext
     """
     poses = (*goal.via, goal.target_pose)
     passed = len(goal.via) - feedback.via_left if feedback is not None else 0

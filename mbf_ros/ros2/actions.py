@@ -78,13 +78,10 @@ class ServedAction:
 
     Parameters
     ----------
-    node : rclpy.node.Node
     name : str
         As clients know it; ``~/`` stands for the name of the node.
-    mapping : ActionMapping
     outcomes : type of enum
         Those of its results.
-    serving : Serving
 
     Attributes
     ----------

@@ -61,7 +61,6 @@ def offers_names(node: Any, choice: bool | None, clock: Clock) -> bool:
 
     Parameters
     ----------
-    node : rclpy.node.Node
     choice : bool, optional
         As of ``is_offered``.
     clock : Clock

@@ -33,9 +33,6 @@ class Nav2Services:
 
     Parameters
     ----------
-    node : rclpy.node.Node
-    server : AbstractNavigationServer
-    serving : Serving
     queries : ServedQueries
         Answers questions beside each other.
     stands_for_amcl : bool

@@ -70,12 +70,10 @@ class RosRobot:
     ----------
     publish : callable
         Sends a command to the robot.
-    transforms : TransformBuffer
     clock : Clock
         Of the stamps of transforms.
     arrivals : Arrivals
         Topics on which messages must come.
-    frames : Frames
     max_silence : callable
         Longest time [s] without a message.
     """

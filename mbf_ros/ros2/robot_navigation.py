@@ -48,10 +48,6 @@ class RobotNavigation(ABC):
         Longest time [s] without a message; that of ``command_timeout`` if None.
     time_to_end : float
         Longest time [s] for goals to end and their results to be sent at the end.
-
-    Attributes
-    ----------
-    session : NavigationSession
     """
 
     name: ClassVar[str]

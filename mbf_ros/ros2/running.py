@@ -46,7 +46,6 @@ class Spinner:
 
     Parameters
     ----------
-    node : rclpy.node.Node
     clock : WallClock
         Makes the thread.
     on_failure : callable

@@ -99,9 +99,6 @@ class Outputs:
 
     Parameters
     ----------
-    node : rclpy.node.Node
-    session : NavigationSession
-    real_time : WallClock
     context : callable
         How stamps and frames relate to ours, now.
     problems : callable

@@ -51,9 +51,6 @@ class ActionlibServer:
 
     Parameters
     ----------
-    topics : TopicTable
-    navigator : Navigator
-    context : MessageContext
     now : callable
         Our time [s].
     post : callable

@@ -39,8 +39,6 @@ class Bridge:
         Makes the threads of services that take time.
     events : EventBus
         Learns of clients, and of faults here.
-    context : MessageContext
-    authentication : Authentication
     cancel_on_disconnect : bool
         Whether the goals of a client that is gone are canceled.
     """

@@ -21,10 +21,8 @@ class ForwardedGoal:
 
     Attributes
     ----------
-    sender : Client
     id : str
         What the sender calls it.
-    wants_feedback : bool
     cancel : callable
         Asks the client that offers the action to cancel it; takes a reason, which the protocol has no field for.
     """

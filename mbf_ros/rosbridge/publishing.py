@@ -29,9 +29,6 @@ class Publisher:
 
     Parameters
     ----------
-    session : NavigationSession
-    topics : TopicTable
-    context : MessageContext
     post : callable
         Has a function called on the event loop of the topics.
     actionlib : ActionlibServer

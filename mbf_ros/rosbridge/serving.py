@@ -80,8 +80,6 @@ def serve_session(
 
     Parameters
     ----------
-    session : NavigationSession
-    options : BridgeOptions, optional
     robot : TopicRobot, optional
         The session's driver, if the robot is a client; else the robot is simulated, and its tf, odometry and scans are
         published.

@@ -43,7 +43,6 @@ class Connection:
         Opens a WebSocket; raises LinkError.
     clock : Clock
         Real time, on which is waited.
-    backoff : Backoff
     greeting : callable
         Frames to be sent first on each new WebSocket.
     on_frame : callable

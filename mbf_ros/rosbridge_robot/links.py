@@ -39,8 +39,6 @@ class RobotLinks:
 
     Parameters
     ----------
-    address : str
-    options : LinkOptions
     clock : Clock
         Real time.
     reports : Reports

@@ -46,8 +46,6 @@ def connect_navigator(
     ----------
     address : str
         Of the robot's rosbridge, e.g. ``ws://robot:9090``.
-    file : Path
-    options : RobotOptions, optional
     report : callable
         Takes what a user should know while it runs: lost connections, bad messages. What it raises is an event.
 

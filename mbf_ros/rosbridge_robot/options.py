@@ -50,7 +50,6 @@ class RobotOptions:
 
     Attributes
     ----------
-    link : LinkOptions
     stamped_commands : bool
         Publish ``/cmd_vel`` as TwistStamped instead of Twist.
     max_silence : float, optional
@@ -59,7 +58,6 @@ class RobotOptions:
         Type, one of ``messages.sensors.SENSORS``, and source in the configuration, by topic.
     cloud_period : float
         Least time [s] between two clouds of a topic that the robot is asked for.
-    time : TimeSource
     time_to_end : float
         Longest time [s] for goals to end and their results to be sent when the navigator ends.
     time_to_send : float

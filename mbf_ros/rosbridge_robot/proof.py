@@ -15,7 +15,6 @@ def auth_frame(secret: str, now: Callable[[], float], rand: Callable[[], str]) -
 
     Parameters
     ----------
-    secret : str
     now : callable
         Seconds since 1970.
     rand : callable

@@ -18,8 +18,6 @@ class RobotState:
     ----------
     session : NavigationSession
         Knows the robot, its sensors and its transforms.
-    topics : TopicTable
-    context : MessageContext
     send : callable
         Publishes a message on a topic.
     """

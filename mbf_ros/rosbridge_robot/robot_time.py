@@ -73,7 +73,6 @@ class RobotTime:
 
     Parameters
     ----------
-    source : TimeSource
     real_time : Clock
         When messages arrive.
     arrivals : Arrivals

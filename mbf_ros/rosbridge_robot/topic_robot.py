@@ -32,7 +32,6 @@ class TopicRobot:
         Takes ``/tf`` and ``/tf_static``.
     clock : Clock
         A wall clock.
-    frames : Frames
     max_silence : callable
         Longest time [s] without a message.
     uses_odometry : bool
@@ -86,8 +85,6 @@ class TopicRobot:
 
         Parameters
         ----------
-        topics : TopicTable
-        context : MessageContext
         server : AbstractNavigationServer
             Takes scans; a sensor is missed only where a map of it listens to the sensor's source.
         sensors : mapping of str to (str, str)

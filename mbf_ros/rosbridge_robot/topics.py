@@ -44,7 +44,6 @@ class Subscription:
 
     Attributes
     ----------
-    type : str
     throttle : int
         Least time between two messages [ms].
     takers : list of callables
@@ -65,8 +64,6 @@ class RobotTopics:
         Our time [s].
     context : callable
         How stamps and frames relate to ours, now.
-    arrivals : Arrivals
-    reports : Reports
     """
 
     def __init__(

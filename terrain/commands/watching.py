@@ -30,7 +30,6 @@ def watched(
 
     Parameters
     ----------
-    options : RunOptions
     page, foxglove : ViewOptions, FoxgloveOptions
         None where it is not served.
     speed : float

@@ -23,8 +23,6 @@ class RobotDescription:
 
     Attributes
     ----------
-    urdf : Urdf
-    stated : UrdfRobot
     gear : RunningGear
         Wheels and supports, in the root link.
     p_root_base : (3,) float64

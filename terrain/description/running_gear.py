@@ -20,14 +20,12 @@ class Wheel:
 
     Attributes
     ----------
-    joint : str
     steering : str
         Joint that steers it, else empty.
     centre, axis : (3,) float64
         Middle of the wheel [m]; unit vector of its axis, to the left for a straight wheel.
     radius, width : float
         [m]
-    is_caster : bool
     ball : bool
         Whether it is a sphere.
     links : tuple of str
@@ -67,7 +65,6 @@ class RunningGear:
         Why this drive.
     wheels : tuple of Wheel
         Without casters, from front left to rear right.
-    supports : tuple of Support
     ground : float
         Height [m] of the ground in the root link.
     """

@@ -113,7 +113,6 @@ class Placed:
 
     Attributes
     ----------
-    solid : Solid
     T_frame_solid : (4, 4) float64
         Where it is in some frame.
     """

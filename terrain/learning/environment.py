@@ -56,7 +56,6 @@ class NavigationEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.float32]]):
         Parts of the observation; a scan only where the scenario has a lidar, if not given.
     commands : CommandRange or mapping, optional
         What actions mean; all that the robot can do, if not given. The limits of the configuration hold, too.
-    reward : RewardWeights or mapping, optional
     control_period : float
         Length of a step [s]; at most ``command_timeout`` of the configuration.
     time_limit : float, optional

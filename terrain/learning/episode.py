@@ -52,7 +52,6 @@ class Episode:
         With one robot.
     options : SessionOptions
         Backend, seed and settings.
-    observed : ObservationParameters
     control_period : float
         Length of a step [s].
 

@@ -74,10 +74,8 @@ class Observer:
 
     Parameters
     ----------
-    parameters : ObservationParameters
     navigation_map : NavigationMap
         The map the robot drives on.
-    transforms : TransformBuffer
     scans : mapping of str to RangeScan
         The newest scan of each sensor; it may change while other threads take scans.
     sources : collection of str

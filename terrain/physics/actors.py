@@ -41,7 +41,6 @@ class Body:
     ----------
     size : (2,) or (3,) float
         Radius and height of an upright cylinder, or length, width and height of a box [m].
-    thing : Thing
     looks : Surface, optional
         In the frame of its middle; those of the cylinder or box where absent.
     """
@@ -67,14 +66,12 @@ class RouteWalker:
 
     Parameters
     ----------
-    world : AnyWorld
     route : (n, 2) or (n, 3) float
         Corners [m]; after the last it goes back to the first. With three columns the third is the ground's height.
     speed : float
         [m/s]
     start : float
         How far along the route [m] it is at time 0.
-    body : Body
     gives_way : bool
         Wait as long as a robot it has met is just ahead, instead of pushing it.
 
@@ -203,10 +200,6 @@ class Fellow:
     """A robot that navigates by itself, as the sensors, monitors and recordings of the other robots have it.
 
     It is an upright cylinder if its outline is round, else a box.
-
-    Parameters
-    ----------
-    robot : SimulatedRobot
     """
 
     thing = Thing.ROBOT

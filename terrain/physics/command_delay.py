@@ -16,7 +16,6 @@ class CommandDelay:
 
     Parameters
     ----------
-    world : SimulatedWorld
     send : callable
         Takes the commands that are due.
     delay : float

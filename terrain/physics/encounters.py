@@ -44,8 +44,6 @@ class Surroundings:
 
     Parameters
     ----------
-    spec : RobotSpec
-    actors : sequence of Actor
     fellows : mapping of str to Actor
         Other robots that navigate, by name.
     """

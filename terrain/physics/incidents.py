@@ -49,7 +49,6 @@ class Incident:
 
     Attributes
     ----------
-    kind : IncidentKind
     stamp : float
         When it counted from [s].
     pose : Pose
@@ -129,7 +128,6 @@ class IncidentMonitor:
 
     Attributes
     ----------
-    counts : Counter of IncidentKind
     max_roll, max_pitch : float
         Largest magnitudes so far [rad].
     slipped : float

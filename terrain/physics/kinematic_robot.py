@@ -27,8 +27,6 @@ class KinematicRobot:
 
     Parameters
     ----------
-    world : KinematicWorld
-    spec : RobotSpec
     pose : Pose
         Start; only x, y and yaw count.
     command_timeout : float

@@ -25,7 +25,6 @@ class Other:
     ----------
     name : str
         Its kind and its number among those of this kind, such as ``person 2``, or that of a robot that navigates.
-    thing : Thing
     gap : float
         Between the two outlines as seen from above [m]; 0 where they overlap.
     speed : float

@@ -132,7 +132,6 @@ class Person:
 
     Parameters
     ----------
-    world : AnyWorld
     route : (n, 2) or (n, 3) float
         Corners [m]; after the last it goes back to the first. With three columns the third is the ground's height.
     speed : float
@@ -141,7 +140,6 @@ class Person:
         How far along the route [m] it is at time 0.
     body : Body
         A cylinder.
-    walls : Walls, optional
     """
 
     def __init__(

@@ -64,7 +64,6 @@ class Actor(Protocol):
 
     Attributes
     ----------
-    thing : Thing
     looks : Surface
         In the actor's own frame.
     size : (2,) or (3,) float

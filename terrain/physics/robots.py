@@ -40,8 +40,6 @@ class WheeledRobot:
 
     Parameters
     ----------
-    world : BulletWorld
-    spec : RobotSpec
     pose : Pose
         Of base_link on the ground; the robot is dropped from a little above (see ``settle``).
     command_timeout : float

@@ -36,7 +36,6 @@ class Simulation:
     ----------
     world : SimulatedWorld
         With its clock at the instant at which the run starts, that is after ``robot.settle()``.
-    robot : SimulatedRobot
     sensors : mapping of str to Sensor
         By topic; each measures at its own rate, the first time at once.
     actors : sequence of Actor

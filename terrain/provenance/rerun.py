@@ -25,7 +25,6 @@ class Repetition:
         Files of the earlier run's folder that are not what they were, or are missing.
     result : RunResult
         Of the repetition.
-    differences : RunDifferences
     """
 
     provenance: Provenance

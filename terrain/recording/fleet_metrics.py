@@ -42,7 +42,6 @@ def together(
 
     Parameters
     ----------
-    scenario : str
     metrics : mapping of str to mapping
         Of each robot, by its name.
     contacts : sequence of mapping

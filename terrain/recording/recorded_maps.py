@@ -96,7 +96,6 @@ class RecordedLayer(NamedTuple):
 
     Attributes
     ----------
-    name : str
     costs : (V,) float16
         In the layer's own unit; inf is forbidden.
     """

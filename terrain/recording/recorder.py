@@ -54,7 +54,6 @@ class Recorder:
     ----------
     scenario, backend : str
         Names, for titles.
-    start : Pose
     goals : sequence of Pose
         More may be added to ``goals`` during the run.
     actors : sequence of Actor

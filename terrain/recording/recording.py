@@ -53,7 +53,6 @@ class RobotShape:
 
     Attributes
     ----------
-    name : str
     footprint : (n, 2) float64
         Outline [m], counter-clockwise.
     height, wheel_radius : float
@@ -108,7 +107,6 @@ class Recording:
         Obstacles are things that are on no map.
     goals : tuple of Pose
         In the order they were given.
-    events : tuple of Event
     verdict : Verdict
         How it ended.
     grids : list of RecordedGrid

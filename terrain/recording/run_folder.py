@@ -37,8 +37,6 @@ class RecordingParts:
     ----------
     folder : Path
         Of the run.
-    recorder : Recorder
-    events : EventBus
     earlier : sequence of Event
         Those that happened before this sink was there.
     origin : callable

@@ -54,15 +54,7 @@ Fault = Annotated[SensorFault | LocalizationJump, Field(discriminator="type")]
 
 
 class FaultSchedule:
-    """Switches the faults of a scenario on and off as the world's time passes.
-
-    Parameters
-    ----------
-    world : AnyWorld
-    sensors : mapping of str to Sensor
-    localization : Localization
-    faults : sequence of Fault
-    """
+    """Switches the faults of a scenario on and off as the world's time passes."""
 
     def __init__(
         self,

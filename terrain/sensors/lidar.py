@@ -60,7 +60,6 @@ class Lidar(Sensor[RangeScan]):
         Name of this sensor in its scans, as layers of a server's configuration call it.
     casters : sequence of RayCaster
         What it can see.
-    model : LidarModel
     """
 
     def __init__(

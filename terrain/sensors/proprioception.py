@@ -123,10 +123,6 @@ class Localization(Sensor[Pose]):
     It can be given a pose (``seat``). From then on it follows the robot's motion from there, and stays as
     wrong as that pose was: it does not find back by itself.
 
-    Parameters
-    ----------
-    noise : PoseNoise
-
     Attributes
     ----------
     offset : (3,) float

@@ -68,15 +68,12 @@ class DriveLoop:
 
     Parameters
     ----------
-    simulation : Simulation
-    robot : ClockedRobot
     localization : Localization
         Its pose is what the server gets.
     server : AbstractNavigationServer
         Gets the scans; its clock drives the loop.
     digest : RunDigest
         Takes the true pose after every step.
-    rates : LoopRates
 
     Attributes
     ----------

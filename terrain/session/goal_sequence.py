@@ -47,7 +47,6 @@ class GoalSequence:
     ----------
     session : Session
         Running.
-    executive : GoalExecutive
     stay : bool
         Wait for further goals after those of the scenario, until ``end`` is called.
 

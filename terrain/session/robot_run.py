@@ -55,8 +55,6 @@ class RobotRun:
     ----------
     session : Session
         Built with the sinks of ``logs``, not running yet.
-    options : RunOptions
-    logs : RunLogs
 
     Attributes
     ----------

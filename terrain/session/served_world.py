@@ -14,7 +14,6 @@ def open_world(scenario: str, backend: str | None, seed: int | None, on_step: Ca
     ----------
     scenario : str
         Name of a shipped scenario, or a file.
-    backend : str, optional
     seed : int, optional
         Instead of the scenario's own.
     on_step : callable

@@ -60,7 +60,6 @@ class Member:
 
     Attributes
     ----------
-    site : Site
     name : str
         Its name; the only robot of a site has none.
     """
@@ -91,7 +90,6 @@ class Session(SimulationSession):
     ----------
     scenario : Scenario or str
         A scenario with one robot, the name of a shipped one, or a file.
-    options : SessionOptions
     member : Member, optional
         Which of several robots in one world it is; without it the session builds the world and closes it.
 

@@ -62,7 +62,6 @@ class SimulationSession(NavigationSession, ABC):
 
     Parameters
     ----------
-    simulation : Simulation
     localization : Localization
         Gives the server its pose.
     config_file : Path

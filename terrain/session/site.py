@@ -30,7 +30,6 @@ class Site:
 
     Parameters
     ----------
-    scenario : Scenario
     options : SessionOptions
         Folder, clock and ``on_step``.
     seeds : mapping of str to int

@@ -88,7 +88,6 @@ def run_guarded(
         Of a module, so that a worker can import it. It runs on the worker's main thread and raises nothing.
     jobs : sequence
         Each can be pickled.
-    workers : int
     time_limit : float
         Wall time [s] that a job may take.
     leaves_traces : callable

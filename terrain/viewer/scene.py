@@ -150,8 +150,6 @@ class RobotModel:
 
     Parameters
     ----------
-    scene : viser.SceneApi
-    shape : RobotShape
     label_height : float
         Where the label floats [m].
     node : str
@@ -195,7 +193,6 @@ class ActorModels:
 
     Parameters
     ----------
-    scene : viser.SceneApi
     tracks : sequence of ActorTrack
         What each is and looks like.
     """

@@ -34,7 +34,6 @@ def geodesic_length(surface: Surface, places: Sequence[Sequence[float]]) -> floa
 
     Parameters
     ----------
-    surface : Surface
     places : sequence of (3,) float
         On the surface, or up to a metre off it: then the nearest point counts.
     """

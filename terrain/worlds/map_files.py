@@ -32,7 +32,6 @@ class MapFiles:
 
     Attributes
     ----------
-    folder : Path
     noise : MapNoise
         What is wrong with the maps.
     rng : numpy Generator

@@ -38,7 +38,6 @@ class MultiLevelWorld:
 
     Attributes
     ----------
-    ground, walls : Surface
     places : mapping of str to Pose
         Named poses on the ground.
     """

@@ -68,8 +68,6 @@ class GraphMap(LayeredMap, DiscMap):
         Neighbours that a robot can drive between, each pair once.
     lethal : (n,) bool
         Ground that no part of the robot may touch.
-    parameters : GraphMapParameters
-    frame_id : str
     ground_costs : (n,) float, optional
         Cost of a metre of the ground in addition to its length.
 

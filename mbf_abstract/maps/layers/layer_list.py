@@ -75,7 +75,6 @@ def plan_layers(
 
     Parameters
     ----------
-    entries : sequence of LayerEntry
     blocks : mapping
         See ``LayerBlocks``.
     load : callable

@@ -71,14 +71,12 @@ class MovingAround:
 
     Attributes
     ----------
-    moving : sequence of TrackedObject
     objects : (k, 5) float32
         Place [m] relative to the robot, velocity [m/s] and radius [m] of each, along the axes of the map.
     yaw : float
         Of the robot [rad].
     box : (5,) float32
         Its outline, a ``RobotBox``.
-    limits : AvoidanceParameters
     """
 
     moving: Sequence[TrackedObject]
@@ -97,8 +95,6 @@ class MovingAround:
             The one the controller works on.
         pose : Pose
             Of the robot, in the frame of the map.
-        now : float
-        limits : AvoidanceParameters
         """
         known = navigation_map.tracked_objects(now) if limits.weight > 0.0 else ()
         moving = moving_on_storey(known, pose.z, navigation_map.same_storey)

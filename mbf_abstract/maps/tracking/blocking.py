@@ -46,10 +46,8 @@ def blockages(
 
     Parameters
     ----------
-    box : RobotBox
     path : Path
         In the frame of the objects.
-    objects : iterable of TrackedObject
     within_time : float
         How far ahead [s] the places of moving objects count; 0 = only where they are now.
     same_storey : float

@@ -49,8 +49,6 @@ def motions_to_standstill(
         Measured.
     command : Twist
         Not zero.
-    share : float
-    limits : Decelerations
 
     Yields
     ------

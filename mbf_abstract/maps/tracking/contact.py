@@ -119,7 +119,6 @@ def safe_share(
 
     Parameters
     ----------
-    box : RobotBox
     pose : Pose
         Of the robot, in the frame of the objects.
     velocity : Twist
@@ -128,7 +127,6 @@ def safe_share(
         What it is about to follow.
     objects : sequence of TrackedObject
         Those that move on the robot's storey count; all are of the same moment.
-    limits : ContactParameters
     same_storey : float
         What is farther above or below [m] is on another storey.
 

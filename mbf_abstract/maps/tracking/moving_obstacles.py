@@ -87,7 +87,6 @@ class MovingObstacles:
 
     Parameters
     ----------
-    parameters : MovingObstaclesParameters
     frame_id : str
         Frame of the map.
     """

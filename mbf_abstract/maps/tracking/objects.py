@@ -31,7 +31,6 @@ class TrackedObject:
     ----------
     number : int
         Identifies it for as long as it is tracked; never used again.
-    motion : Motion
     x, y, z : float
         Estimated middle [m], in the frame ``frame_id``; z is that of its points, or of the ground below them.
     vx, vy : float
@@ -48,7 +47,6 @@ class TrackedObject:
         How long it has been standing [s]; 0 while it moves.
     stamp : float
         Time of all this [s].
-    frame_id : str
     """
 
     number: int

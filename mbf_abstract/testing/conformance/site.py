@@ -42,8 +42,6 @@ class Site:
 
     Attributes
     ----------
-    rig : BackendRig
-    server : MapServer
     navigator : Navigator
     """
 

@@ -52,7 +52,6 @@ def check_controller(
 
     Parameters
     ----------
-    controller_class : type
     path : Path
         A path it can follow to its end; the robot starts on the first pose.
     make_context, parameters, watched, cancel_within

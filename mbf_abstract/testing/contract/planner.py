@@ -47,7 +47,6 @@ def check_planner(
 
     Parameters
     ----------
-    planner_class : type
     problems : sequence of (start, goal)
         Questions that have an answer; make one of them take a while.
     make_context : callable

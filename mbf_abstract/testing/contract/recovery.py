@@ -89,7 +89,6 @@ def check_recovery(
 
     Parameters
     ----------
-    recovery_class : type
     start : Pose, optional
         Where the robot stands; the origin if not given.
     make_context, parameters, watched

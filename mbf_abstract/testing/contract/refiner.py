@@ -38,7 +38,6 @@ def check_refiner(
 
     Parameters
     ----------
-    refiner_class : type
     path : Path
         A path it can refine; shorter parts of it are tried too.
     make_context, parameters, watched

@@ -216,8 +216,6 @@ def hybrid_search(
 
     Parameters
     ----------
-    ground : Ground
-    car : Car
     from_start, from_goal : Target
         What the trees from the start and from the goal grow to: the goal with the cost-to-go to it, and the start with
         the cost from there, in cells; inf where there is no path.

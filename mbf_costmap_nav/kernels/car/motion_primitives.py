@@ -38,7 +38,6 @@ class Car(NamedTuple):
     ----------
     radius : float
         Of the turning circle [m].
-    reversing : bool
     cost_factor, reverse_factor, turning_factor : float
         What cells of cost 252 add to a length, in lengths; factors on lengths driven backward, and on those of curves.
     change_cost : float

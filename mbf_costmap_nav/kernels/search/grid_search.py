@@ -47,7 +47,6 @@ def search(
 
     Parameters
     ----------
-    grid : PaddedGrid
     start, goal : int
         Flat padded indices; ``goal`` = -1 settles everything reachable.
     heuristic_scale : float

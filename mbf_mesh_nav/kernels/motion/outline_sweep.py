@@ -81,7 +81,6 @@ def sweep(
         Bearing [rad] off the course and distance [m] of points on it.
     stride, turn : float
         Length [m] and turn [rad] of one step.
-    steps : int
 
     Returns
     -------

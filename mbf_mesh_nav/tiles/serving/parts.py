@@ -29,7 +29,6 @@ class OnWindow(Plugin, Generic[L]):
 
     Parameters
     ----------
-    plugin_class : type
     context : MapContext
         With a map of tiles that has a window.
 

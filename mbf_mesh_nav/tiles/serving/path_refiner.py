@@ -37,7 +37,6 @@ class PathRefiner(MapPlugin, AbstractRefiner):
 
     Parameters
     ----------
-    refiner_class : type
     context : MapContext
         With a map of tiles.
     """

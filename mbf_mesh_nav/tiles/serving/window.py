@@ -126,7 +126,6 @@ class FollowingWindow:
 
     Attributes
     ----------
-    settings : WindowSettings
     now : Window
         Until the robot's pose is known it lies anywhere on the surface.
 

@@ -22,7 +22,6 @@ class ClassicPlanner:
 
     Parameters
     ----------
-    mission : MissionContext
     planner : str
         Empty = the first one loaded.
     frequency : float

@@ -85,7 +85,6 @@ class ClassicSettings:
         Time [s] without a plan, without a valid command, before a recovery.
     max_planning_retries : int
         Failed plans before a recovery; negative = only patience counts.
-    recovery_behavior_enabled : bool
     recovery_behaviors : tuple of str, optional
         Names in their fixed order; None = all that are loaded.
     oscillation_timeout, oscillation_distance : float
@@ -108,8 +107,6 @@ class ClassicMoveBase:
 
     Parameters
     ----------
-    navigator : Navigator
-    settings : ClassicSettings
     planner, controller : str
         Empty = the first one loaded.
     """

@@ -17,7 +17,6 @@ class Joined:
 
     Attributes
     ----------
-    rows : list of dict
     entries : dict of str to dict
         Map, settings and code of every line, as in the head of results.
     origins : list of str

@@ -43,7 +43,6 @@ class Standing:
         Mean over the worlds with a route; a failure is 0.
     time_s, planning_ms : float or None
         Medians: of the successes, and of all runs.
-    arrived_without_route : int
     contacts, near_misses : int or None
         Sums of contacts in which the robot moved, and of near misses; None where a run has no such numbers.
     failures : dict of str to int

@@ -57,7 +57,6 @@ class Protocol:
 
     Attributes
     ----------
-    name, version : str
     about : str
         What it is, in a sentence.
     backend : str
@@ -66,7 +65,6 @@ class Protocol:
         At least one; all with the same configurations.
     rules : mapping
         Parameters of the judge and of what counts as a success, as they stand in the results.
-    judge : callable
     entries : mapping of str to Entry
         The shipped ones.
     part : str

@@ -84,14 +84,7 @@ def hash_of_parameters(world_file: Path) -> str:
 
 
 class Campaign:
-    """The runs of one world, kept in a folder.
-
-    Parameters
-    ----------
-    folder : Path
-    world : Path
-    workers : int
-    """
+    """The runs of one world, kept in a folder."""
 
     def __init__(self, folder: Path, world: Path, workers: int = 1) -> None:
         self.world = world

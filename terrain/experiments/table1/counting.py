@@ -41,14 +41,12 @@ class Tally:
         ``main_ok``, ``main_failed``, ``second_ok``, ``second_failed``.
     controller_calls : int
         Plans handed over to the controller.
-    control_cycles : int
     recoveries : dict of str to int
         Calls of each behaviour.
     useless : int
         Recoveries after which the same failure came back within 5 s.
     contacts : dict of str to int
         ``rack/we``, ``robot/we``, ``robot/they``: what was touched and who moved.
-    legs : list of Leg
     """
 
     planner_calls: dict[str, int] = field(default_factory=dict)

@@ -30,7 +30,6 @@ class Repetition:
 
     Attributes
     ----------
-    tally : Tally
     recovery_goals : int
         Recovery goals that were started, counted apart from the calls of the behaviours.
     digest : str

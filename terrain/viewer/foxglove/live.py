@@ -79,9 +79,6 @@ class LiveServer:
     ----------
     name : str
         Shown by the app.
-    feed : Feed
-    steering : Steering
-    options : ServerOptions
     note : callable
         Takes what the user should know.
     began : float
@@ -150,8 +147,6 @@ class LiveFoxglove:
     ----------
     session : Session
         Made, not running yet.
-    sequence : GoalSequence
-    options : FoxgloveOptions
     speed : float
         Simulated seconds per second at most; 0 = no limit.
     note : callable

@@ -39,7 +39,6 @@ def serve_robot(
         Of a scenario, it is shown as ``mbf run`` shows it.
     send : callable
         Takes goals; raises ValueError where none are taken.
-    options : FoxgloveOptions
     name : str
         Of the robot.
     note : callable

@@ -36,7 +36,6 @@ class FoxgloveService:
     ----------
     name : str
         Shown by the app.
-    steering : Steering
     post : callable
         Has a function called on the event loop.
     on_fault : callable

@@ -37,7 +37,6 @@ class Steering:
 
     Parameters
     ----------
-    server : AbstractNavigationServer
     go_to : callable
         Takes a goal on the ground; its handle, if there is one, is nobody's.
     cancel : callable

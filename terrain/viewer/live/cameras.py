@@ -32,7 +32,6 @@ class Cameras:
 
     Parameters
     ----------
-    server_page : viser.ViserServer
     start : Recording
         The run as it begins: what an overview shows.
     ground : Surface

@@ -42,8 +42,6 @@ class LiveControls:
 
     Parameters
     ----------
-    session : Session
-    sequence : GoalSequence
     source, place : str
         What is served: the source of events about what was asked for, and its name in texts.
 
@@ -98,7 +96,6 @@ class LiveControls:
 
         Parameters
         ----------
-        ray : Ray
         facing : Ray, optional
             Through what the robot is to face there; without it, it faces on from where it comes.
         """

@@ -32,7 +32,6 @@ class Ground:
 
     Parameters
     ----------
-    server_page : viser.ViserServer
     navigation : AbstractNavigationServer
         Whose map is shown.
     ground : Surface

@@ -46,8 +46,6 @@ class MovingThings:
 
     Parameters
     ----------
-    server_page : viser.ViserServer
-    session : Session
     pin_height : float
         Height [m] of markers.
     """

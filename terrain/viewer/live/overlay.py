@@ -11,7 +11,6 @@ class Overlay:
 
     Parameters
     ----------
-    gui : viser.GuiApi
     label : str
         Label of the box.
     """

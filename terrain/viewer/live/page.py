@@ -42,12 +42,6 @@ class LivePage:
 
     Parameters
     ----------
-    server_page : viser.ViserServer
-    session : Session
-    sequence : GoalSequence
-    controls : LiveControls
-    log : LiveLog
-    stick : Stick
     channel : VisitorChannel
         Of the server.
     steered : bool

@@ -20,15 +20,7 @@ HINT = (
 
 
 class DrivePanel:
-    """Goals: what a click is, cancel, pause, plugins, end.
-
-    Parameters
-    ----------
-    server_page : viser.ViserServer
-    controls : LiveControls
-    stick : Stick
-    session : Session
-    """
+    """Goals: what a click is, cancel, pause, plugins, end."""
 
     def __init__(self, server_page: Any, controls: LiveControls, stick: Stick, session: Session) -> None:
         gui = server_page.gui

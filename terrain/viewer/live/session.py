@@ -80,8 +80,6 @@ class LiveSession:
     ----------
     session : Session
         Made, not running yet.
-    sequence : GoalSequence
-    options : ViewOptions
     on_page : callable
         Called with the page's address.
     on_note : callable

@@ -36,7 +36,6 @@ class Stick:
 
     Parameters
     ----------
-    server : AbstractNavigationServer
     wall : Clock
         Wall time.
     take_over : callable

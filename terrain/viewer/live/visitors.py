@@ -15,17 +15,7 @@ from terrain.viewer.server.visitor_channel import Place, VisitorChannel
 
 
 class Visitors:
-    """Turns places in pictures into rays, and posts what visitors ask for; see ``VisitorActions``.
-
-    Parameters
-    ----------
-    server_page : viser.ViserServer
-    channel : VisitorChannel
-    controls : LiveControls
-    stick : Stick
-    cameras : Cameras
-    readout : Readout
-    """
+    """Turns places in pictures into rays, and posts what visitors ask for; see ``VisitorActions``."""
 
     def __init__(
         self,

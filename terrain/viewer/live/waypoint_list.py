@@ -26,8 +26,6 @@ class WaypointList:
 
     Parameters
     ----------
-    server_page : viser.ViserServer
-    controls : LiveControls
     sequence : GoalSequence
         Has the waypoint that the robot goes to.
     pin_height : float

@@ -24,7 +24,6 @@ class MovingFrames:
 
     Parameters
     ----------
-    shape : RobotShape
     frame : str
         Of the map.
     """

@@ -102,7 +102,6 @@ class Stamped:
     ----------
     time : float
         [s] of the run.
-    topic : str
     make : callable
         Returns the protobuf message or the ``JsonMessage``.
     part : str, optional

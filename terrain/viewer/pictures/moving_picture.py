@@ -47,7 +47,6 @@ class MovingPicture:
 
     Parameters
     ----------
-    recording : Recording
     size : (width, height)
         Of the frames [pixels].
     """

@@ -39,7 +39,6 @@ class PageGuard:
 
     Parameters
     ----------
-    access : PageAccess
     channel : VisitorChannel, optional
         Takes the connections of visitors' own scripts.
 
@@ -78,7 +77,6 @@ class PageGuard:
         ----------
         path : str
             With its token and query.
-        headers : websockets.Headers
         """
         hosts, origins, upgrades = (headers.get_all(name) for name in ("Host", "Origin", "Upgrade"))
         if len(hosts) != 1 or not self._access.knows_host(hosts[0]):

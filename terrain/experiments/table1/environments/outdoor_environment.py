@@ -24,7 +24,6 @@ class OutdoorEnvironment(Session):
 
     Parameters
     ----------
-    scenario_file : Path
     surroundings : Surroundings
         Only the planner's latency counts: nothing moves here but the robot.
     seed : int

@@ -54,8 +54,6 @@ class WarehouseEnvironment(SimulationSession):
 
     Parameters
     ----------
-    world : World
-    surroundings : Surroundings
     seed : int
         Of traffic, sensors, plugins and planner latencies.
     navigation : Path

@@ -25,8 +25,6 @@ class WarehouseWorld(KinematicWorld):
 
     Parameters
     ----------
-    building : OccupancyGrid
-    shuttles : sequence of Shuttle
     on_contact : callable
         Called with ``(with_what, who_moved)`` once for each contact: "rack" or "robot", "we" or "they".
     """

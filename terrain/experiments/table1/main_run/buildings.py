@@ -65,7 +65,6 @@ class Building:
 
     Attributes
     ----------
-    name : str
     world : callable
         The world of a seed; the same for all seeds but in a family.
     ways_around : callable
