@@ -274,10 +274,7 @@ class MPPIController(SurfaceFollower):
         ahead, remaining = self._path_ahead()
         poses = np.empty((3, motions.shape[1] if around.anybody else 0, len(motions)), dtype=np.float32)
         scores, collided = score_rollouts(
-            mesh_map.vertices,
-            mesh_map.faces,
-            mesh_map.face_neighbours,
-            mesh_map.face_normals,
+            mesh_map.topology.surface,
             snapshot.costs,
             self._ranks_at(snapshot),
             spot.face,

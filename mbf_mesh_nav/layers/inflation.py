@@ -100,15 +100,10 @@ class InflationLayer(MeshLayer):
 
     def _repair(self, changed: IntArray, costs: CostArray) -> IntArray:
         """Bring distances and costs up to date in place; a vertex that became a source has changed at any cost."""
-        mesh, settings, source = self.topology, self.parameters, self.inputs[0]
+        settings, source = self.parameters, self.inputs[0]
         self._is_source[changed] = source.lethal[changed] | (source.costs[changed] >= settings.source_cost)
         touched, flips = repair_distances(
-            mesh.vertices,
-            mesh.faces,
-            mesh.vertex_face_offsets,
-            mesh.vertex_faces,
-            mesh.neighbour_offsets,
-            mesh.neighbours,
+            self.topology.surface,
             settings.inflation_radius,
             self._is_source,
             self._known_sources,

@@ -68,9 +68,8 @@ def swept_obstacle(
     outline = np.column_stack([arctan2(points[:, 1], points[:, 0]) - course, distances])
     point, normal = vector_of(place.point), vector_of(mesh.face_normals[place.face])
     ahead = turned(tangent(vector_of(pose.rotation[:, 0]), normal), normal, course)
-    surface = mesh.vertices, mesh.faces, mesh.face_neighbours, mesh.face_normals
     step = command.speed * seconds, command.wz * seconds, steps
-    touched, corner = sweep(*surface, ranks, place.face, point, ahead, outline, *step)
+    touched, corner = sweep(mesh.surface, ranks, place.face, point, ahead, outline, *step)
     return f"an obstacle is in the way: the robot would turn into it at {position_text(corner)}" if touched else ""
 
 

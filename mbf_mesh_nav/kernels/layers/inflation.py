@@ -17,6 +17,7 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.search.near_far import after
 
 RIGHT_ANGLE_TOLERANCE = 1e-9
@@ -76,12 +77,7 @@ def face_offer(vertices: FloatArray, vertex: int, v1: int, d1: float, v2: int, d
 
 @kernel
 def repair_distances(
-    vertices: FloatArray,
-    faces: IntArray,
-    face_offsets: IntArray,
-    incident: IntArray,
-    neighbour_offsets: IntArray,
-    neighbours: IntArray,
+    surface: Surface,
     radius: float,
     lethal: BoolArray,
     known_lethal: BoolArray,
@@ -93,10 +89,6 @@ def repair_distances(
 
     Parameters
     ----------
-    vertices, faces : (V, 3) float64 [m], (F, 3) int32
-    face_offsets, incident : (V+1,), (3F,) int32
-        Faces at each vertex.
-    neighbour_offsets, neighbours : (V+1,), (2E,) int32
     radius : float
         Vertices farther [m] get no distance.
     lethal, known_lethal : (V,) bool
@@ -114,6 +106,8 @@ def repair_distances(
     flips : int
         Number of vertices whose flag changed.
     """
+    vertices, faces, face_offsets = surface.vertices, surface.faces, surface.vertex_face_offsets
+    neighbour_offsets, neighbours = surface.neighbour_offsets, surface.neighbours
     count, reach = len(vertices), np.float32(radius)
     touched = np.empty(count, dtype=np.int32)
     queue = np.empty(count + 1, dtype=np.int32)
@@ -164,7 +158,7 @@ def repair_distances(
         state[vertex] &= ~_WAITING
         reached = distances[vertex]
         for position in range(Index(face_offsets[vertex]), Index(face_offsets[vertex + ONE])):
-            face = Index(incident[position])
+            face = Index(surface.vertex_faces[position])
             for corner in range(3):
                 other = Index(faces[face, corner])
                 if distances[other] <= reached:

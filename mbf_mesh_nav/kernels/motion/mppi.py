@@ -12,8 +12,9 @@ import math
 
 import numpy as np
 
-from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.mesh.surface_walk import turned, walk
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, cross, difference, dot, norm, row
 from mbf_mesh_nav.kernels.search.forbidden_surface import may_enter, rank_at
@@ -24,10 +25,7 @@ PATH, COST, TILT, TURN, GOAL, HEADING = range(6)
 
 @kernel
 def score_rollouts(
-    vertices: FloatArray,
-    faces: IntArray,
-    face_neighbours: IntArray,
-    face_normals: FloatArray,
+    surface: Surface,
     costs: Float32Array,
     ranks: Float32Array,
     start_face: int,
@@ -46,8 +44,6 @@ def score_rollouts(
 
     Parameters
     ----------
-    vertices, faces, face_neighbours, face_normals
-        The mesh.
     costs, ranks : (V,) float32
         The current map; ``forbidden_surface.py`` defines the rank of forbidden surface and where a rollout
         that starts there may go.
@@ -74,6 +70,9 @@ def score_rollouts(
     scores : (n,) float64
     collided : (n,) bool
     """
+    # A walk takes single arrays: as one argument they would be counted at each call, which takes six times as long.
+    vertices, faces = surface.vertices, surface.faces
+    face_neighbours, face_normals = surface.face_neighbours, surface.face_normals
     sequence_count, step_count, _ = controls.shape
     scores = np.empty(sequence_count, dtype=np.float64)
     collided = np.zeros(sequence_count, dtype=np.bool_)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.mesh.surface_walk import turned, walk
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, difference, dot, row
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK
@@ -54,10 +55,7 @@ def touching(
 
 @kernel
 def sweep(
-    vertices: FloatArray,
-    faces: IntArray,
-    face_neighbours: IntArray,
-    face_normals: FloatArray,
+    surface: Surface,
     ranks: Float32Array,
     face: int,
     point: Vector,
@@ -71,8 +69,6 @@ def sweep(
 
     Parameters
     ----------
-    vertices, faces, face_neighbours, face_normals
-        As for ``walk``.
     ranks : (V,) float32
         How forbidden the vertices are.
     face, point, course
@@ -88,6 +84,8 @@ def sweep(
     point : (3,) float
         Where, if so.
     """
+    vertices, faces = surface.vertices, surface.faces
+    face_neighbours, face_normals = surface.face_neighbours, surface.face_normals
     touches = np.empty(len(outline), dtype=np.bool_)
     touching(vertices, faces, face_neighbours, face_normals, ranks, face, point, course, outline, touches)
     before = touches.sum()

@@ -31,8 +31,8 @@ def rolled_out(mesh_map, begin, yaw, controls, steps):
     path = np.column_stack([np.linspace(2.0, 5.0, 30), np.full(30, 3.0), np.linspace(1.5, 2.4, 30)])
     poses = np.full((3, steps, len(controls)), np.nan, dtype=np.float32)
     scores, collided = score_rollouts(
-        mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, mesh_map.face_normals,
-        np.zeros(len(mesh_map.vertices), dtype=np.float32), ranks, spot.face, tuple(map(float, spot.point)), heading,
+        mesh_map.topology.surface, np.zeros(len(mesh_map.vertices), dtype=np.float32), ranks,
+        spot.face, tuple(map(float, spot.point)), heading,
         controls, PERIOD, path, np.linspace(3.0, 0.0, 30), np.ones(6), (0.4, 0.5), 1.0, poses,
     )  # fmt: skip
     return (spot, heading), scores, collided, poses
