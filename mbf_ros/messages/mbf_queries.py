@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.maps.map_queries import MapQueries
+from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.queries import CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_ros.messages.geometry import InvalidValueError, MessageContext, path_of, pose_of, pose_stamped
 from mbf_ros.messages.interfaces import Message, MessageError
 
@@ -23,24 +23,12 @@ FACTORS = ("lethal_cost_mult", "inscrib_cost_mult", "unknown_cost_mult")
 
 
 @dataclass(frozen=True)
-class PathQuestion:
-    """The arguments of ``MapQueries.check_path``."""
+class MapQuestion:
+    """One service: its type, what asks the map and makes the answer, and the answer where that raises."""
 
-    path: Path
-    query: PlaceQuery
-    return_on: CellState | None
-    skip_poses: int
-    path_cells_only: bool
-
-
-@dataclass(frozen=True)
-class ValidPoseQuestion:
-    """The arguments of ``MapQueries.find_valid_pose``; distances [m], angles [rad]."""
-
-    pose: Pose | None
-    dist_tolerance: float
-    angle_tolerance: float
-    query: PlaceQuery
+    type: str
+    ask: Callable[[AbstractNavigationServer, Message, MessageContext], Message]
+    no_answer: Message
 
 
 def point_question(request: Message, context: MessageContext) -> tuple[Pose, bool]:
@@ -56,38 +44,33 @@ def pose_question(request: Message, context: MessageContext) -> tuple[Pose | Non
     return _pose(request, context), _place_query(request)
 
 
-def path_question(request: Message, context: MessageContext) -> PathQuestion:
-    """Return path and query of a CheckPath_Request."""
+def path_question(request: Message, context: MessageContext) -> dict[str, Any]:
+    """Return the arguments of ``MapQueries.check_path`` for a CheckPath_Request."""
     state = request["return_on"]
     if state not in tuple(CellState):
         raise MessageError(f"return_on must be a state from 0 to {max(CellState)}, got {state}")
-    path, skip = path_of(request["path"], context), request["skip_poses"]
-    return PathQuestion(path, _place_query(request), CellState(state) or None, skip, request["path_cells_only"])
+    return {
+        "path": path_of(request["path"], context),
+        "query": _place_query(request),
+        "return_on": CellState(state) or None,
+        "skip_poses": request["skip_poses"],
+        "path_cells_only": request["path_cells_only"],
+    }
 
 
-def valid_pose_question(request: Message, context: MessageContext) -> ValidPoseQuestion:
-    """Return pose, tolerances and query of a FindValidPose_Request."""
-    tolerances = request["dist_tolerance"], request["angle_tolerance"]
-    return ValidPoseQuestion(_pose(request, context), *tolerances, _place_query(request))
-
-
-def place_answer(answer: PlaceAnswer) -> Message:
+def place_answer(answer: PlaceAnswer | PathAnswer | PoseAnswer) -> Message:
     """Return a CheckPoint_Response or a CheckPose_Response."""
     return {"state": int(answer.state), "cost": _cost(answer.cost)}
 
 
 def path_answer(answer: PathAnswer) -> Message:
     """Return a CheckPath_Response; ``last_checked`` of a path without poses is 0."""
-    return {"last_checked": max(answer.last_checked, 0), "state": int(answer.state), "cost": _cost(answer.cost)}
+    return {**place_answer(answer), "last_checked": max(answer.last_checked, 0)}
 
 
 def valid_pose_answer(answer: PoseAnswer, context: MessageContext) -> Message:
     """Return a FindValidPose_Response; the pose is in no frame where none was found."""
-    return {
-        "state": int(answer.state),
-        "cost": _cost(answer.cost),
-        "pose": pose_stamped(answer.pose, context),
-    }
+    return {**place_answer(answer), "pose": pose_stamped(answer.pose, context)}
 
 
 def _is_local(request: Message) -> bool:
@@ -119,40 +102,29 @@ def _cost(cost: float) -> int:
     return round(cost) if 0.0 <= cost < MAX_COST else MAX_COST if cost > 0.0 else 0
 
 
-@dataclass(frozen=True)
-class MapQuestion:
-    """One service: its type, and what asks the map and makes the answer."""
-
-    type: str
-    ask: Callable[[MapQueries, Message, MessageContext], Message]
+def _ask_point(server: AbstractNavigationServer, request: Message, context: MessageContext) -> Message:
+    return place_answer(server.queries.check_point(*point_question(request, context)))
 
 
-def _ask_point(queries: MapQueries, request: Message, context: MessageContext) -> Message:
-    point, local = point_question(request, context)
-    return place_answer(queries.check_point(point, local))
+def _ask_pose(server: AbstractNavigationServer, request: Message, context: MessageContext) -> Message:
+    return place_answer(server.queries.check_pose(*pose_question(request, context)))
 
 
-def _ask_pose(queries: MapQueries, request: Message, context: MessageContext) -> Message:
-    return place_answer(queries.check_pose(*pose_question(request, context)))
+def _ask_path(server: AbstractNavigationServer, request: Message, context: MessageContext) -> Message:
+    return path_answer(server.queries.check_path(**path_question(request, context)))
 
 
-def _ask_path(queries: MapQueries, request: Message, context: MessageContext) -> Message:
-    return path_answer(queries.check_path(**_arguments(path_question(request, context))))
-
-
-def _ask_valid_pose(queries: MapQueries, request: Message, context: MessageContext) -> Message:
-    answer = queries.find_valid_pose(**_arguments(valid_pose_question(request, context)))
+def _ask_valid_pose(server: AbstractNavigationServer, request: Message, context: MessageContext) -> Message:
+    pose, query = pose_question(request, context)
+    answer = server.queries.find_valid_pose(pose, request["dist_tolerance"], request["angle_tolerance"], query)
     return valid_pose_answer(answer, context)
 
 
-def _arguments(question: PathQuestion | ValidPoseQuestion) -> dict[str, Any]:
-    return dict(vars(question))
-
-
+NO_ANSWER: Message = {"state": int(CellState.UNKNOWN), "cost": 0}
 MAP_QUESTIONS = {
-    "check_point_cost": MapQuestion("mbf_msgs/srv/CheckPoint", _ask_point),
-    "check_pose_cost": MapQuestion("mbf_msgs/srv/CheckPose", _ask_pose),
-    "check_path_cost": MapQuestion("mbf_msgs/srv/CheckPath", _ask_path),
-    "find_valid_pose": MapQuestion("mbf_msgs/srv/FindValidPose", _ask_valid_pose),
+    "check_point_cost": MapQuestion("mbf_msgs/srv/CheckPoint", _ask_point, NO_ANSWER),
+    "check_pose_cost": MapQuestion("mbf_msgs/srv/CheckPose", _ask_pose, NO_ANSWER),
+    "check_path_cost": MapQuestion("mbf_msgs/srv/CheckPath", _ask_path, NO_ANSWER),
+    "find_valid_pose": MapQuestion("mbf_msgs/srv/FindValidPose", _ask_valid_pose, NO_ANSWER),
 }
 """By the names of the services of ``mbf_costmap_nav`` upstream."""

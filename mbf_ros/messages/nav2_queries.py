@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import numpy as np
 
 from mbf_abstract.drive.robot import RobotStateError
@@ -15,21 +12,13 @@ from mbf_abstract.maps.queries import CellState
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_ros.messages.geometry import MessageContext, path_of
 from mbf_ros.messages.interfaces import Message, MessageError
+from mbf_ros.messages.mbf_queries import MapQuestion
 
 LETHAL_COST = 254  # of a cell, as Nav2 counts
 LIMITS = {253: CellState.INSCRIBED, LETHAL_COST: CellState.LETHAL, 255: CellState.LETHAL}
 """From which state on a place is forbidden, by ``max_cost``."""
 NOT_VALID: Message = {"is_valid": False, "invalid_pose_indices": []}
 """The answer where there is none."""
-
-
-@dataclass(frozen=True)
-class ServerQuestion:
-    """One service: its type, what answers it, and the answer where that raises."""
-
-    type: str
-    ask: Callable[[AbstractNavigationServer, Message, MessageContext], Message]
-    no_answer: Message
 
 
 def is_path_valid(server: AbstractNavigationServer, request: Message, context: MessageContext) -> Message:
@@ -61,7 +50,7 @@ def _nearest(server: AbstractNavigationServer, path: Path) -> int:
     return int(np.argmin(norm(path.positions - np.array(robot.position))))
 
 
-def _clearing(local: bool, inside: bool | None = None) -> ServerQuestion:
+def _clearing(local: bool, inside: bool | None = None) -> MapQuestion:
     """Service that clears one of the two maps: all of it, or only what is inside or outside of a square."""
 
     def clear(server: AbstractNavigationServer, request: Message, context: MessageContext) -> Message:
@@ -72,11 +61,11 @@ def _clearing(local: bool, inside: bool | None = None) -> ServerQuestion:
         return {}
 
     name = {None: "ClearEntireCostmap", True: "ClearCostmapAroundRobot", False: "ClearCostmapExceptRegion"}[inside]
-    return ServerQuestion(f"nav2_msgs/srv/{name}", clear, {})
+    return MapQuestion(f"nav2_msgs/srv/{name}", clear, {})
 
 
 NAV2_QUESTIONS = {
-    "is_path_valid": ServerQuestion("nav2_msgs/srv/IsPathValid", is_path_valid, NOT_VALID),
+    "is_path_valid": MapQuestion("nav2_msgs/srv/IsPathValid", is_path_valid, NOT_VALID),
     "global_costmap/clear_entirely_global_costmap": _clearing(local=False),
     "local_costmap/clear_entirely_local_costmap": _clearing(local=True),
     "global_costmap/clear_around_global_costmap": _clearing(local=False, inside=True),

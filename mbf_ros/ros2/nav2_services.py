@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_ros.messages.geometry import NO_COVARIANCE, pose_stamped
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.messages.nav2_queries import NAV2_QUESTIONS, ServerQuestion
+from mbf_ros.messages.nav2_queries import NAV2_QUESTIONS
 from mbf_ros.ros2.actions import Serving
-from mbf_ros.ros2.conversion import fill, interface_class, to_dict
+from mbf_ros.ros2.conversion import fill, interface_class
 from mbf_ros.ros2.services import ServedQueries
 
 SERVERS = (
@@ -50,15 +49,12 @@ class Nav2Services:
     ) -> None:
         self._node, self._server, self._serving = node, server, serving
         for name, question in NAV2_QUESTIONS.items():
-            queries.serve(question.type, name, self._asking(question), question.no_answer)
+            queries.offer(name, question)
         state = interface_class("lifecycle_msgs/srv/GetState")
         for name in (*SERVERS, AMCL) if stands_for_amcl else SERVERS:
             node.create_service(state, f"{name}/get_state", self._get_state, callback_group=queries.group)
         if stands_for_amcl:
             self._stand_for_amcl()
-
-    def _asking(self, question: ServerQuestion) -> Callable[[Any], Message]:
-        return lambda request: question.ask(self._server, to_dict(request), self._serving.context())
 
     def _get_state(self, request: Any, response: Any) -> Any:
         return fill(response, {"current_state": INACTIVE if self._serving.refusal() else ACTIVE})

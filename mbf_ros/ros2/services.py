@@ -10,7 +10,6 @@ from collections.abc import Callable
 from typing import Any
 
 from mbf_abstract.event_values import error_text
-from mbf_abstract.maps.queries import CellState
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message
@@ -19,7 +18,6 @@ from mbf_ros.ros2.conversion import fill, interface_class, to_dict
 
 MAX_CALLS = 20
 """How many questions may be worked on at a time."""
-NO_ANSWER: Message = {"state": int(CellState.UNKNOWN), "cost": 0}
 
 
 class ServedQueries:
@@ -38,7 +36,7 @@ class ServedQueries:
         self._calls = 0
         self.group = ReentrantCallbackGroup()  # in the group of the node all inputs would wait for an answer
         for name, question in MAP_QUESTIONS.items():
-            self.serve(question.type, f"~/{name}", self._asking(question), NO_ANSWER)
+            self.offer(f"~/{name}", question)
         self.serve("std_srvs/srv/Empty", "~/clear_costmaps", self._clear, {})
         trigger = interface_class("std_srvs/srv/Trigger")
         for name, call, text in (
@@ -57,8 +55,13 @@ class ServedQueries:
 
         self._node.create_service(interface_class(type_name), name, call, callback_group=self.group)
 
-    def _asking(self, question: MapQuestion) -> Callable[[Any], Message]:
-        return lambda request: question.ask(self._server.queries, to_dict(request), self._context())
+    def offer(self, name: str, question: MapQuestion) -> None:
+        """Offer the service of a question."""
+
+        def answer(request: Any) -> Message:
+            return question.ask(self._server, to_dict(request), self._context())
+
+        self.serve(question.type, name, answer, question.no_answer)
 
     def _clear(self, request: Any) -> Message:
         self._server.queries.clear_map()

@@ -93,7 +93,7 @@ def _key(name: str) -> str:
 
 def _map_service(navigator: Navigator, question: MapQuestion, context: MessageContext) -> Service:
     def ask(request: Message) -> Message:
-        return question.ask(navigator.server.queries, request, context)
+        return question.ask(navigator.server, request, context)
 
     return Service(question.type, ask, takes_time=True, changes_nothing=True)
 

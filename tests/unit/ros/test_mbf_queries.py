@@ -36,8 +36,8 @@ def test_a_point_is_looked_at_in_its_frame():
 def test_a_path_is_checked_up_to_a_state_and_zero_is_none():
     fields = {"path": {"poses": [HERE]}, "skip_poses": 3, "path_cells_only": True}
     question = queries.path_question(request("CheckPath", return_on=2, **fields), CONTEXT)
-    assert (question.return_on, question.skip_poses, question.path_cells_only) == (CellState.LETHAL, 3, True)
-    assert queries.path_question(request("CheckPath", return_on=0, **fields), CONTEXT).return_on is None
+    assert (question["return_on"], question["skip_poses"], question["path_cells_only"]) == (CellState.LETHAL, 3, True)
+    assert queries.path_question(request("CheckPath", return_on=0, **fields), CONTEXT)["return_on"] is None
 
 
 @pytest.mark.parametrize(
