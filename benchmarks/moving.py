@@ -133,9 +133,9 @@ def summary(rows: list[Row]) -> Iterator[str]:
         resolved = sum(row["arrived"] == row["robots"] for row in own)
         lost, legs = sum(row["robots"] - row["arrived"] for row in own), sum(row["robots"] for row in own)
         contacts, moving = sum(row["contacts"] for row in own), sum(row["contacts_while_moving"] for row in own)
-        way = "" if right_of_way else "without "
+        arm_text = "" if right_of_way else "without right of way, "
         yield (
-            f"{on:8} {case:14} {executive:12} {way}resolved {resolved} of {len(own)}, lost legs {lost} of {legs}, "
+            f"{on:8} {case:14} {executive:12} {arm_text}resolved {resolved} of {len(own)}, lost legs {lost} of {legs}, "
             f"contacts between robots {contacts}, contacts in which a robot moved {moving}, median time "
             f"{float(np.median([row['time_s'] for row in own])):.0f} s"
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -41,6 +40,7 @@ def table1(
         from terrain.experiments.table1.experiment import ChecksFailed, run_experiment, tracks
         from terrain.experiments.table1.picture import draw_tracks
         from terrain.experiments.table1.report import show
+        from terrain.experiments.table1.result_file import write_result
         from terrain.sweeps.command import parse_seeds
 
         chosen, console = parse_seeds(seeds), Console()
@@ -58,7 +58,7 @@ def table1(
         loaded = None if outdoor else load_world(world)
         name = "outdoor" if loaded is None else loaded.name
         file, picture = out / f"table1_{name}.json", out / f"table1_{name}.png"
-        file.write_text(json.dumps(result, indent=1) + "\n")
+        write_result(file, result)
         draw_tracks(picture, loaded, tracks(campaign, chosen))
         console.print(show(result))
         console.print(f"results in {file}, {picture}", soft_wrap=True)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import typer
 
 from mbf_abstract.commands.reporting import readable_errors
-from mbf_abstract.whole_files import write_whole
 
 UNSEEN = "4000:4040"
 
@@ -37,6 +35,7 @@ def table1_main(
         from terrain.experiments.table1.main_run import table
         from terrain.experiments.table1.main_run.picture import draw_curves
         from terrain.experiments.table1.main_run.run import known_rows, run_missing, trials
+        from terrain.experiments.table1.result_file import write_result
         from terrain.sweeps.command import parse_seeds
 
         console = Console()
@@ -47,7 +46,7 @@ def table1_main(
                 console.print(_line(trial.building, trial.seed, trial.condition, row), highlight=False)
         groups = table.grouped(known_rows(rows, asked), depot)
         judged = table.result(groups)
-        write_whole(rows.with_suffix(".json"), json.dumps(table.to_json(judged), indent=1) + "\n")
+        write_result(rows.with_suffix(".json"), table.to_json(judged))
         if groups:
             draw_curves(rows.with_suffix(".png"), groups)
         console.print(table.show(judged))
