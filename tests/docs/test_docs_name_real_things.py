@@ -4,11 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-import typer
-import yaml
 
-from mbf_abstract.cli import make_app
-from mbf_abstract.config.configuration import PLUGIN_LISTS
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.geometry import Path as GeometricPath
@@ -26,30 +22,6 @@ PAGES = sorted(page for page in DOCS.glob("*.md"))
 TEXTS = "\n".join(page.read_text("utf-8") for page in PAGES)
 
 
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", TEXTS, re.DOTALL)
-
-
-def test_every_command_of_the_shell_blocks_exists():
-    known = set(typer.main.get_command(make_app()).commands)
-    used = {name for block in blocks("sh") for name in re.findall(r"^mbf (\w+)", block, re.MULTILINE)}
-
-    assert used and used <= known
-
-
-def test_every_option_of_the_shell_blocks_exists():
-    lines = [line.split("#")[0] for block in blocks("sh") for line in block.splitlines()]
-    calls = re.findall(r"(?:^|&& )mbf ([^&\n]*)", "\n".join(lines), re.MULTILINE)
-
-    assert len(calls) > 20
-    for call in calls:
-        command = typer.main.get_command(make_app())
-        for word in call.split():
-            command = getattr(command, "commands", {}).get(word, command)
-        known = {option for parameter in command.params for option in parameter.opts + parameter.secondary_opts}
-        assert set(re.findall(r"--[a-z0-9-]+", call)) <= known | {"--help"}, f"mbf {call}"
-
-
 def test_every_file_of_python_that_is_named_exists():
     folders = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain", "tests", "benchmarks", "examples", "docs")
     known = [f"/{file.relative_to(DOCS.parent)}" for name in folders for file in (DOCS.parent / name).rglob("*.py")]
@@ -63,21 +35,6 @@ def test_every_decision_is_linked_from_the_concepts():
     page = (DOCS / "concepts.md").read_text("utf-8")
 
     assert [file.name for file in sorted((DOCS / "decisions").glob("*.md")) if file.name not in page] == []
-
-
-def test_every_script_of_the_shell_blocks_exists():
-    used = {name for block in blocks("sh") for name in re.findall(r"python (\S+\.py)", block)}
-
-    assert [name for name in used if not (DOCS.parent / name).is_file()] == []
-
-
-def test_every_yaml_block_has_known_keys_or_names_of_its_plugins():
-    sections = {"global_costmap", "local_costmap", "mesh_map", "tiled_map", "elevation_grid"}
-    for block in blocks("yaml"):
-        data = yaml.safe_load(block)
-        names = {item["name"] for key in PLUGIN_LISTS for item in data.get(key, [])}
-        unknown = set(data) - names - sections - {"backend", *PLUGIN_LISTS, *NavigationParameters.model_fields}
-        assert not unknown, block
 
 
 @pytest.mark.parametrize(
