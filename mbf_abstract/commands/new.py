@@ -8,7 +8,6 @@ command by adding such a folder. What runs on every map has its templates here, 
 from __future__ import annotations
 
 import keyword
-from importlib.metadata import entry_points
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -16,6 +15,7 @@ from string import Template
 import typer
 
 from mbf_abstract.commands.reporting import readable_errors
+from mbf_abstract.config.installed_plugins import installed_points
 
 GROUPS = {"planner": "planners", "controller": "controllers", "recovery": "recoveries", "layer": "{map}_layers"}
 """Kind of a plugin -> last word of its entry-point group."""
@@ -125,7 +125,7 @@ def _place(template: str, map_name: str) -> tuple[str, str]:
 
 def _servers() -> dict[str, str]:
     """Top-level package of each installed map server."""
-    return {point.name: point.module.partition(".")[0] for point in entry_points(group="mbf.servers")}
+    return {point.name: point.module.partition(".")[0] for point in installed_points("mbf.servers")}
 
 
 def _servers_package(map_name: str) -> str:

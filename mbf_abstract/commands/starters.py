@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import os
-from importlib.metadata import entry_points
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -18,6 +17,7 @@ import typer
 
 from mbf_abstract.commands.completion import starting_with
 from mbf_abstract.commands.reporting import readable_errors
+from mbf_abstract.config.installed_plugins import installed_points
 
 PLACEHOLDER = "$map_file"
 
@@ -58,7 +58,7 @@ def config(
 
 def starters() -> dict[str, str]:
     """Return the names and texts of all starters of the installed packages, by name."""
-    packages = {point.module.partition(".")[0] for point in entry_points(group="mbf.servers")}
+    packages = {point.module.partition(".")[0] for point in installed_points("mbf.servers")}
     folders = [files(package).joinpath("starters") for package in packages]
     found = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]
     texts = {file.name.removesuffix(".yaml"): file.read_text("utf-8") for file in found if file.name.endswith(".yaml")}

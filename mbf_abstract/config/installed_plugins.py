@@ -1,11 +1,17 @@
 """The plugins that installed packages offer by entry points, without importing any of them.
 
 ``mbf plugins`` lists from here at once; ``registry`` imports the classes. Nothing is imported here that takes time.
+Entry points are read once for each state of the Python path: reading those of 200 packages takes 5 ms, and one command
+asks for ten groups.
 """
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 
 DISTRIBUTION = "mbf-flex"
@@ -37,10 +43,30 @@ class PluginEntry:
     error: str | None
 
 
+def installed_points(group: str) -> tuple[EntryPoint, ...]:
+    """Return the entry points of a group, by its full name; what was installed meanwhile is seen."""
+    return tuple(_all_points(tuple(_changes_of_path())).select(group=group))  # type: ignore[attr-defined]
+
+
+def _changes_of_path() -> Iterator[tuple[str, int]]:
+    """Yield each folder of the Python path with the time of its last change [ns], as an installation is one."""
+    for entry in sys.path:
+        try:
+            yield entry, os.stat(entry or ".").st_mtime_ns
+        except OSError:
+            yield entry, 0
+
+
+@lru_cache(maxsize=1)
+def _all_points(changes: tuple[tuple[str, int], ...]) -> object:
+    """Read the entry points of all groups; other ``changes`` make it read them anew."""
+    return entry_points()
+
+
 def points_of(group: str) -> dict[str, list[EntryPoint]]:
     """Return the entry points of one of ``GROUPS`` by name; more than one of a name is a clash."""
     points: dict[str, list[EntryPoint]] = {}
-    for point in entry_points(group=f"mbf.{group}"):
+    for point in installed_points(f"mbf.{group}"):
         points.setdefault(point.name, []).append(point)
     return points
 

@@ -10,7 +10,6 @@ give up waiting only, shield the handle:
 
 from __future__ import annotations
 
-import asyncio
 import math
 import threading
 from collections.abc import Callable, Generator
@@ -142,6 +141,8 @@ class GoalHandle(Generic[G, R, F]):
         return self._wait_async().__await__()
 
     async def _wait_async(self) -> R:
+        import asyncio  # only who awaits a goal needs it; it takes 20 ms
+
         loop = asyncio.get_running_loop()
         finished = loop.create_future()
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
 from mbf_abstract.config.configuration import Config, RawConfig, load_config, validate_config
 from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.installed_plugins import installed_points
 from mbf_abstract.config.registry import PluginError, PluginRegistry
 from mbf_abstract.drive.robot import Robot
 from mbf_abstract.events import EventBus
@@ -53,8 +53,8 @@ def installed_servers(suffix: str = "") -> Iterator[type[AbstractNavigationServe
         first, so that the others need not be imported; else they come by their names.
     """
     registry = PluginRegistry()
-    servers = {point.name: point.value for point in entry_points(group="mbf.servers")}
-    reading = {point.value for point in entry_points(group=MAP_FILES_GROUP) if f".{point.name}" == suffix.lower()}
+    servers = {point.name: point.value for point in installed_points("mbf.servers")}
+    reading = {point.value for point in installed_points(MAP_FILES_GROUP) if f".{point.name}" == suffix.lower()}
     for name in sorted(servers, key=lambda name: (servers[name] not in reading, name)):
         yield registry.load("servers", name, AbstractNavigationServer)
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,10 @@ from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import CellBox, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
-from mbf_costmap_nav.planning.car_search import CarWorld, Driving, search_drive
 from mbf_costmap_nav.planning.outline_course import Course, stretches
+
+if TYPE_CHECKING:
+    from mbf_costmap_nav.planning.car_search import Driving
 
 FloatArray = NDArray[np.float64]
 
@@ -165,6 +168,8 @@ class Manoeuvres:
 
     def _drive(self, course: Course, first: int, last: int) -> FloatArray | None:
         """Poses (n, 3) between two poses of a course that the outline can drive; None if none were found."""
+        from mbf_costmap_nav.planning.car_search import CarWorld, search_drive  # with kernels that few paths need
+
         radius = self.footprint.circumscribed_radius
         ends = course.poses[[first, last]]
         if first == 0 and course.start_yaw is not None:
@@ -192,6 +197,8 @@ class Manoeuvres:
         return None
 
     def _driving(self, radius: float, max_states: int) -> Driving:
+        from mbf_costmap_nav.planning.car_search import Driving
+
         return Driving(
             radius=radius,
             reversing=True,

@@ -11,13 +11,14 @@ A void stays a hole in the mesh: where nothing was measured, there is no surface
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.config.installed_plugins import installed_points
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.mesh_report import MeshError
@@ -29,7 +30,7 @@ ElevationReader = Callable[[Path, int], tuple[NDArray[Any], float, float]]
 
 def elevation_readers() -> dict[str, EntryPoint]:
     """Readers of elevation models by ending, such as ".tif"; not loaded yet."""
-    return {f".{point.name}": point for point in entry_points(group=READERS_GROUP)}
+    return {f".{point.name}": point for point in installed_points(READERS_GROUP)}
 
 
 def read_elevation(path: Path, max_faces: int) -> tuple[FloatArray, NDArray[np.int64]]:

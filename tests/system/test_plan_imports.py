@@ -59,9 +59,11 @@ def test_a_plan_that_nobody_watches_loads_no_progress_bar_and_nothing_that_it_do
     loaded = {*done.stdout.split("\n")[-2].split()}
     assert "numba" in loaded and not loaded & {
         "rich",
+        "asyncio",
         "scipy.ndimage",
         "matplotlib",
         "trimesh",
+        "mbf_costmap_nav.planning.car_search",
         "mbf_mesh_nav.server",
         "terrain.physics",
     }

@@ -52,7 +52,7 @@ class CostmapDeclaration(PluginDeclaration):
 @pytest.fixture(autouse=True)
 def nothing_installed(monkeypatch):
     """Hide the entry points of the installed packages."""
-    monkeypatch.setattr("mbf_abstract.config.installed_plugins.entry_points", lambda group: [])
+    monkeypatch.setattr("mbf_abstract.config.installed_plugins.installed_points", lambda group: [])
 
 
 def registry(**options):

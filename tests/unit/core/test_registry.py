@@ -35,7 +35,7 @@ class FreePlanner(MeshPlanner):
 @pytest.fixture(autouse=True)
 def nothing_installed(monkeypatch):
     """Hide the entry points of the installed packages."""
-    monkeypatch.setattr(installed_plugins, "entry_points", lambda group: [])
+    monkeypatch.setattr(installed_plugins, "installed_points", lambda group: [])
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def installed(monkeypatch):
             vars(point).update(dist=SimpleNamespace(name=distribution, version="1.0"))
             points.append(point)
         monkeypatch.setattr(
-            installed_plugins, "entry_points", lambda group: [point for point in points if point.group == group]
+            installed_plugins, "installed_points", lambda group: [point for point in points if point.group == group]
         )
 
     return install

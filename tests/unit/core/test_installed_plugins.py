@@ -1,0 +1,47 @@
+"""Entry points of installed packages are read once, and again when a package comes or goes."""
+
+import importlib.metadata
+
+import pytest
+
+from mbf_abstract.config import installed_plugins
+from mbf_abstract.config.installed_plugins import installed_points, points_of
+
+GROUP = "mbf.planners"
+
+
+@pytest.fixture
+def install(tmp_path, monkeypatch):
+    """Put a distribution with a planner into a folder of the Python path."""
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def install(name):
+        info = tmp_path / f"{name}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(f"[{GROUP}]\n{name} = {name}:Planner\n")
+
+    return install
+
+
+def names():
+    return {point.name for point in installed_points(GROUP)}
+
+
+def test_a_package_that_was_installed_meanwhile_is_seen(install):
+    install("spiral")
+    before = names()
+    install("zigzag")
+
+    assert {"spiral"} <= before and "zigzag" not in before
+    assert names() == before | {"zigzag"}
+    assert points_of("planners")["zigzag"][0].value == "zigzag:Planner"
+
+
+def test_what_has_not_changed_is_read_once(monkeypatch):
+    reads = []
+    monkeypatch.setattr(installed_plugins, "entry_points", lambda: reads.append(1) or importlib.metadata.entry_points())
+    installed_plugins._all_points.cache_clear()
+
+    assert [bool(installed_points(group)) for group in (GROUP, "mbf.servers", "mbf.nothing")] == [True, True, False]
+    assert len(reads) == 1
