@@ -11,9 +11,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +37,10 @@ from mbf_mesh_nav.tiles.tile_graph import costs_between_portals
 
 PORTALS_OF_A_SIDE = 16
 """Portals along the side of a tile, unless a length is given."""
+Entries = Generator[TileEntry | None, None, None]
+"""Of tiles as they are there, in any order; None for one without a face."""
+EntriesOf = Callable[[Sequence[TileKey]], Entries]
+"""Builds the tiles with some keys."""
 
 
 @dataclass(frozen=True)
@@ -181,6 +187,7 @@ def build_tiles(
     settings: TileSettings,
     *,
     workers: int = 1,
+    entries_of: EntriesOf | None = None,
     name: str = "",
     on_tile: Callable[[int, int], None] = lambda done, total: None,
 ) -> TileIndex:
@@ -192,6 +199,8 @@ def build_tiles(
         Made if it is missing.
     workers : int
         Tiles built at the same time, by threads: the kernels do not hold the interpreter's lock.
+    entries_of : callable, optional
+        Builds the tiles instead of these threads, such as ``cluster_build.entries_from_cluster``.
     name : str
         What the index calls the source.
     on_tile : callable, optional
@@ -204,7 +213,12 @@ def build_tiles(
     """
     builder = TileBuilder(source, settings)
     _prepare(folder, builder.build)
-    entries = _build_all(builder, folder, source.keys(settings.tile_size), workers, on_tile)
+    keys, entries = source.keys(settings.tile_size), []
+    with closing((entries_of or partial(_by_threads, builder, folder, workers))(keys)) as built:
+        for done, entry in enumerate(built, start=1):
+            if entry is not None:
+                entries.append(entry)
+            on_tile(done, len(keys))
     if not entries:
         raise MeshError(name or "tiles", ["there is no face in it"])
     index = TileIndex(
@@ -217,7 +231,7 @@ def build_tiles(
         layers=builder.layers,
         default_layer=builder.default_layer,
         profiles=settings.all_profiles(),
-        tiles=tuple(entries),
+        tiles=tuple(sorted(entries, key=lambda entry: entry.key)),
     )
     write_index(folder, index)
     return index
@@ -235,24 +249,19 @@ def _prepare(folder: Path, build: str) -> None:
         unfinished.unlink(missing_ok=True)
 
 
-def _build_all(
-    builder: TileBuilder, folder: Path, keys: list[TileKey], workers: int, on_tile: Callable[[int, int], None]
-) -> list[TileEntry]:
-    """Entries of all tiles with a face, sorted by their keys; builds those that are missing."""
-    entries = []
+def _by_threads(builder: TileBuilder, folder: Path, workers: int, keys: Sequence[TileKey]) -> Entries:
+    """Build the tiles that are missing, by threads of this process."""
     with ThreadPoolExecutor(max_workers=workers) as pool:
-        futures = [pool.submit(_entry_of, builder, tile_file(folder, key), key) for key in keys]
+        futures = [pool.submit(entry_of, builder, tile_file(folder, key), key) for key in keys]
         try:
-            for done, future in enumerate(as_completed(futures), start=1):
-                entries.append(future.result())
-                on_tile(done, len(keys))
+            for future in as_completed(futures):
+                yield future.result()
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-    return sorted((entry for entry in entries if entry is not None), key=lambda entry: entry.key)
 
 
-def _entry_of(builder: TileBuilder, path: Path, key: TileKey) -> TileEntry | None:
+def entry_of(builder: TileBuilder, path: Path, key: TileKey) -> TileEntry | None:
     """Entry of a tile, which is built unless it is there and sound; None if it has no face."""
     tile = None
     if path.exists():

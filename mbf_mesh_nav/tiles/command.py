@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -24,6 +25,9 @@ def tile(
     ),
     spacing: float = typer.Option(0.0, "--spacing", min=0.0, help="Distance of the heights of a .npy file [m]."),
     workers: int = typer.Option(1, "--workers", min=1, help="Tiles built at the same time."),
+    scheduler: str | None = typer.Option(
+        None, "--scheduler", help="Address of a Dask scheduler, whose workers build the tiles in the shared folder."
+    ),
     as_json: bool = typer.Option(False, "--json", help="Print the figures as one JSON object."),
 ) -> None:
     """Cut a map into tiles, compute their layers and what it costs to pass them."""
@@ -34,6 +38,7 @@ def tile(
         from mbf_mesh_nav.map.map_builder import MeshMapParameters, height_error_of
         from mbf_mesh_nav.server import BARE_MESH
         from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
+        from mbf_mesh_nav.tiles.cluster_build import BuildOrder, entries_from_cluster
         from mbf_mesh_nav.tiles.source_files import open_source
 
         _, checked = read_config_text(BARE_MESH.format(file='""')) if config is None else read_config(config)
@@ -51,11 +56,16 @@ def tile(
         )
         with waiting(f"reading {source.name}") as say:
             opened = open_source(source, parameters, spacing)
+            entries_of = None
+            if scheduler is not None:
+                order = BuildOrder(source.resolve(), spacing, settings, out.resolve(), settings.digest(opened))
+                entries_of = partial(entries_from_cluster, order, scheduler)
             index = build_tiles(
                 opened,
                 out,
                 settings,
                 workers=workers,
+                entries_of=entries_of,
                 name=source.name,
                 on_tile=lambda done, total: say(f"{done} of {total} tiles"),
             )

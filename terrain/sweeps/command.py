@@ -52,9 +52,9 @@ def sweep(
         from rich.markup import escape
         from rich.progress import track
 
+        from mbf_abstract.cluster import run_on_cluster
         from mbf_abstract.event_values import well_formed
         from terrain.scenarios.scenario import load_scenario
-        from terrain.sweeps.cluster import run_on_cluster
         from terrain.sweeps.log import SweepLog
         from terrain.sweeps.report import write_tables
         from terrain.sweeps.sweep import hash_of, is_done, plan_sweep, run_once

@@ -12,12 +12,12 @@ import pytest
 from distributed import Client
 from pyarrow import parquet
 
-from terrain.sweeps.cluster import ClusterError, run_on_cluster
+from mbf_abstract.cluster import ClusterError, run_on_cluster
 
 pytestmark = pytest.mark.timeout(300)
 
 COMMAND = "import typer; from terrain.sweeps.command import sweep; typer.run(sweep)"
-CONNECT = "import sys; from terrain.sweeps.cluster import run_on_cluster; list(run_on_cluster(print, [], sys.argv[1]))"
+CONNECT = "import sys; from mbf_abstract.cluster import run_on_cluster; list(run_on_cluster(print, [], sys.argv[1]))"
 SCENARIO = """
 name: trial
 proves: A short drive.

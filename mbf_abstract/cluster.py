@@ -1,8 +1,8 @@
-"""Runs of a sweep on a Dask cluster: many machines instead of many processes of one.
+"""Jobs on a Dask cluster: many machines instead of many processes or threads of one.
 
-Use it where one machine takes too long; needs the extra ``cluster`` here, and this package and the same scenario files
-on every worker. Start workers with one thread each (``dask worker ADDRESS --nthreads 1``): PyBullet allows no second
-thread. A worker that dies costs nothing but time, Dask gives its runs to another one.
+Use it where one machine takes too long; needs the extra ``cluster`` here, and this package and the files of the jobs on
+every worker. Start workers with one thread each (``dask worker ADDRESS --nthreads 1``): PyBullet allows no second
+thread. A worker that dies costs nothing but time, Dask gives its jobs to another one.
 """
 
 from __future__ import annotations
@@ -25,8 +25,10 @@ def run_on_cluster(do: Callable[[J], R], jobs: Sequence[J], address: str) -> Ite
 
     Parameters
     ----------
-    do, jobs
-        As for ``terrain.sweeps.worker_pool.run_in_workers``.
+    do : callable
+        Of a module, so that a worker can import it.
+    jobs : sequence
+        Each can be pickled.
     address : str
         Of the scheduler, such as ``tcp://10.0.0.1:8786``.
 
@@ -35,7 +37,7 @@ def run_on_cluster(do: Callable[[J], R], jobs: Sequence[J], address: str) -> Ite
     ClusterError
         Dask is not installed, no scheduler answers at the address, or a worker has several threads.
     distributed.KilledWorker
-        A run took several workers down with it.
+        A job took several workers down with it.
     """
     try:
         from distributed import Client, as_completed
@@ -53,7 +55,7 @@ def run_on_cluster(do: Callable[[J], R], jobs: Sequence[J], address: str) -> Ite
 
 
 def _refuse_threads(client: Any) -> None:
-    """A second run in a process would share its simulator; workers that come later are not looked at."""
+    """A second job in a process would share its simulator; workers that come later are not looked at."""
     workers = client.scheduler_info(n_workers=-1)["workers"]
     shared = [name for name, worker in workers.items() if worker["nthreads"] > 1]
     if shared:
