@@ -9,6 +9,7 @@ faces of which no measured place breaks the bound.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -84,16 +85,21 @@ def decimated_to(vertices: FloatArray, faces: IntArray, share: float) -> Decimat
     return coarse
 
 
+def require_simplification() -> None:
+    """Raise MeshError unless ``fast-simplification`` is installed."""
+    if find_spec("fast_simplification") is None:
+        raise MeshError("--decimate", ["needs fast-simplification: pip install 'mbf-flex[maps]'"])
+
+
 def _locator(vertices: FloatArray, faces: IntArray) -> SurfaceLocator:
     return SurfaceLocator(build_topology(checked_mesh(vertices, faces)[0]))
 
 
 def _of_share(vertices: FloatArray, faces: IntArray, whole: SurfaceLocator, share: float) -> DecimatedMesh | None:
     """The mesh with this share of its faces; None where that leaves no sound mesh."""
-    try:
-        import fast_simplification
-    except ImportError as error:
-        raise MeshError("--decimate", [f"needs fast-simplification: pip install 'mbf-flex[maps]' ({error})"]) from error
+    require_simplification()
+    import fast_simplification
+
     points, corners = fast_simplification.simplify(*_with_skirts(vertices, faces), target_reduction=1.0 - share)
     corners = corners[unit_face_normals(points, corners.astype(np.int32))[:, 2] > UPWARD]
     try:

@@ -16,7 +16,7 @@ import numpy as np
 from mbf_abstract.whole_files import replacing
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.building.clouds.point_cloud import MAX_POINTS, PointCloud, read_clouds
-from mbf_mesh_nav.building.decimation import DecimatedMesh, decimated
+from mbf_mesh_nav.building.decimation import DecimatedMesh, decimated, require_simplification
 from mbf_mesh_nav.building.map_facts import MapFacts, map_facts
 from mbf_mesh_nav.building.surface import BuiltSurface, SurfaceParameters, build_surface
 from mbf_mesh_nav.files.map_header import MapHeader, header_comments
@@ -61,6 +61,9 @@ def build_map(
         raise MeshError(str(out), ["there is no such folder"])
     if any(file.exists() and out.exists() and file.samefile(out) for file in files):
         raise MeshError(str(out), ["is one of the inputs, which are never changed"])
+    is_decimated = parameters is not None and parameters.decimation_bound > 0.0
+    if is_decimated:
+        require_simplification()
     cloud = read_clouds(
         files,
         up_axis=up_axis,
@@ -72,7 +75,7 @@ def build_map(
     )
     surface = build_surface(cloud.points, parameters, on_step)
     facts, mesh = map_facts(cloud, surface), DecimatedMesh(surface.vertices, surface.faces)
-    if parameters is not None and parameters.decimation_bound > 0.0:
+    if parameters is not None and is_decimated:
         on_step("decimation")
         mesh = decimated(surface.vertices, surface.faces, parameters.decimation_bound)
         facts = facts.of_decimated(mesh)

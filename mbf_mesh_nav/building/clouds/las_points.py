@@ -7,6 +7,7 @@ survey itself classifies as noise (classes 7 and 18) or withholds are left out.
 from __future__ import annotations
 
 import re
+import struct
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,8 @@ LENGTH_UNIT = re.compile(r'UNIT\["[^"]*(?:met|foot|feet|ft)[^"]*",\s*([0-9.eE+-]
 """A linear unit of a coordinate system as well-known text, with its length [m]."""
 SMALLEST_HEADER = 227
 """Bytes of the header of LAS 1.0."""
+TABLE_PLACE = struct.Struct("<q")
+"""Where the table of the compressed chunks begins, from the start of the file: the first number of LAZ points."""
 
 
 def read_las_points(path: Path, max_points: int) -> StoredPoints:
@@ -56,6 +59,8 @@ def read_las_points(path: Path, max_points: int) -> StoredPoints:
                 found = (path.stat().st_size - int(header.offset_to_point_data)) // size
                 if found < count:
                     raise MeshError(str(path), [f"the file is cut off: expected {count} points, found {found}"])
+            else:
+                _refuse_cut_chunks(path, int(header.offset_to_point_data), count)
             text, keys = _stated_system(header)
             unit = _unit(path, text, keys)
             points, is_kept = _read_chunks(path, reader, count)
@@ -66,6 +71,21 @@ def read_las_points(path: Path, max_points: int) -> StoredPoints:
     dropped = count - int(is_kept.sum())
     notes = (f"{dropped} points are classified as noise or withheld",) if dropped else ()
     return StoredPoints(points[is_kept] if dropped else points, notes=notes, unit=unit, crs=_crs(text, keys))
+
+
+def _refuse_cut_chunks(path: Path, points_begin: int, count: int) -> None:
+    """Refuse a LAZ file that ends before the table of its chunks, which is the last thing that belongs to the points.
+
+    A writer that cannot go back in its file leaves -1 there and puts the place at the end; such a file is not judged.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        file.seek(points_begin)
+        first = file.read(TABLE_PLACE.size)
+    (table,) = TABLE_PLACE.unpack(first) if len(first) == TABLE_PLACE.size else (points_begin + TABLE_PLACE.size,)
+    if size <= table or len(first) < TABLE_PLACE.size:
+        promised = f"expected {count} compressed points up to byte {table} and a table of them"
+        raise MeshError(str(path), [f"the file is cut off: {promised}, found {size} bytes"])
 
 
 def _read_chunks(path: Path, reader: Any, count: int) -> tuple[Any, Any]:

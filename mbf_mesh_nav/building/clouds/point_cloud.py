@@ -49,6 +49,8 @@ SHORTEST, LONGEST = 1.0, 50_000.0
 """Extents [m] of a plausible map."""
 SAME_UNIT_RATIO = 200.0
 """Extents of two files of one map that differ by more are hardly in the same unit."""
+MIXED_SHARE, RING_SHARE = 0.05, 0.01
+"""Of a file that mixes units: least share of its points in either unit, greatest share around those of the larger."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +126,7 @@ def read_clouds(
             systems.setdefault(stored.crs, file.name)
         _refuse_lost_digits(file, points, stored.single_precision, stated[file] or 1.0)
         parts.append(points if is_on_map else on_the_map(points, FileFrame(up_axis or "z", stated[file] or 1.0)))
+        _refuse_mixed_units(file, parts[-1])
         notes += [f"{file.name}: {note}" for note in (*stored.notes, *dropped)]
     if len(set(stated.values())) > 1:
         text = ", ".join(
@@ -198,6 +201,30 @@ def _refuse_lost_digits(file: Path, points: FloatArray, single_precision: bool, 
     if step > COARSEST_STEP:
         text = f"coordinates of {largest:.0f} in four-byte floats are only {step:.2g} m exact"
         raise MeshError(str(file), [text], "Export them as double, or with an offset")
+
+
+def _refuse_mixed_units(file: Path, points: FloatArray) -> None:
+    """Refuse a file with points in metres and in millimetres: those in metres lie in one spot of all, as low as small.
+
+    The spot is three cells wide, each one ``SAME_UNIT_RATIO``th of the extent, with hardly a point around it; the other
+    points are as many times higher. A dense scan in a wide survey has neither.
+    """
+    lower = points[:, :2].min(axis=0)
+    extent = float(np.ptp(points[:, :2], axis=0).max())
+    if extent < SAME_UNIT_RATIO * SHORTEST:
+        return
+    side, columns = extent / SAME_UNIT_RATIO, int(SAME_UNIT_RATIO) + 1
+    cells = np.minimum((points[:, :2] - lower) / side, SAME_UNIT_RATIO).astype(np.int32)
+    counts = np.bincount(cells[:, 0] * columns + cells[:, 1], minlength=columns * columns)
+    distances = np.abs(cells - np.divmod(int(counts.argmax()), columns)).max(axis=1)
+    in_spot = distances <= 1
+    share, around = float(in_spot.mean()), float((distances <= 4).mean())
+    if not MIXED_SHARE <= share <= 1.0 - MIXED_SHARE or around - share > RING_SHARE:
+        return
+    heights = [float(np.ptp(np.percentile(points[chosen, 2], (10.0, 90.0)))) for chosen in (in_spot, ~in_spot)]
+    if heights[1] >= SAME_UNIT_RATIO * heights[0]:
+        text = f"{share:.0%} of its points lie within {3.0 * side:.3g} m, the others are up to {extent:.6g} m apart"
+        raise MeshError(str(file), [f"expected one unit, {text}"], "Bring all of its points to metres first")
 
 
 def _refuse_units(files: Sequence[Path], parts: Sequence[FloatArray], is_stated: bool) -> None:

@@ -97,6 +97,24 @@ def test_the_unit_of_a_las_file_is_that_of_its_coordinate_system(tmp_path, unit,
     assert cloud.unit == length
 
 
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_a_file_that_mixes_metres_and_millimetres_is_refused(tmp_path, share):
+    scale = np.where(np.arange(len(POINTS)) < share * len(POINTS), 1.0, 1000.0)
+    text = refusal(write_text(tmp_path / "mixed.xyz", POINTS * scale[:, None]))
+    assert "mixed.xyz: expected one unit" in text and f"{share:.0%} of its points lie within 4" in text
+    assert "Bring all of its points to metres first" in text
+
+
+def test_a_dense_scan_in_a_wide_survey_and_a_scan_from_one_place_are_of_one_unit(tmp_path):
+    rng = np.random.default_rng(2)
+    wide = rng.uniform((0, 0, 0), (4000, 3000, 90), (400, 3))
+    yard = rng.uniform((1500, 1200, 40), (1510, 1210, 44), (600, 3))
+    far, bearing = 1.8 / np.tan(rng.uniform(0.002, 1.0, 2000)), rng.uniform(0.0, 6.3, 2000)
+    scan = np.column_stack([far * np.cos(bearing), far * np.sin(bearing), 0.02 * rng.normal(size=2000)])
+    for name, points in (("yard", np.vstack([wide, yard])), ("scan", scan)):
+        assert len(read_clouds([write_text(tmp_path / f"{name}.xyz", points)]).points) == len(points)
+
+
 def test_noise_that_the_survey_marks_is_left_out_and_reported(tmp_path):
     classes = np.where(np.arange(len(POINTS)) % 10 == 0, 7, 2)
     cloud = read_clouds([write_las(tmp_path / "survey.laz", POINTS, classes=classes)])
@@ -122,6 +140,16 @@ def test_a_truncated_file_is_refused(tmp_path, name, keep):
 def test_a_truncated_las_file_names_what_is_missing(tmp_path):
     file = cut(write_las(tmp_path / "survey.las", POINTS), 0.5)
     assert re.search(r"the file is cut off: expected 400 points, found 1\d\d", refusal(file))
+
+
+@pytest.mark.parametrize("keep", [0.95, 0.99])
+def test_a_truncated_laz_file_names_what_is_missing(tmp_path, keep):
+    whole = write_las(tmp_path / "survey.laz", POINTS)
+    size = int(keep * whole.stat().st_size)
+    text = refusal(cut(whole, keep))
+    assert re.search(
+        rf"the file is cut off: expected 400 compressed points up to byte \d+ and .*, found {size} bytes", text
+    )
 
 
 @pytest.mark.parametrize("name", [name for name in WRITERS if not name.startswith("survey")])  # LAS: whole numbers

@@ -9,6 +9,7 @@ from surveyed_ground import bridge, ground, hills, tree
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
+from mbf_mesh_nav.building import decimation
 from mbf_mesh_nav.building.map_build import build_map
 from mbf_mesh_nav.files.map_header import MapHeader, read_map_header
 from mbf_mesh_nav.files.mesh_io import read_mesh
@@ -139,6 +140,13 @@ def test_where_a_map_cannot_be_written_it_is_not_begun(tmp_path, survey):
     with pytest.raises(MeshError, match="is one of the inputs, which are never changed"):
         build_map([tmp_path / "cloud.ply"], tmp_path / "cloud.ply", on_step=steps.append)
     assert steps == []
+
+
+def test_a_package_that_decimation_needs_is_asked_for_before_a_file_is_read(tmp_path, monkeypatch):
+    monkeypatch.setattr(decimation, "find_spec", lambda name: None)
+    done = run("map", "build", tmp_path / "none.las", "--out", tmp_path / "map.ply", "--decimate", "0.02")
+    assert done.exit_code == 2
+    assert done.stderr == "error: --decimate: needs fast-simplification: pip install 'mbf-flex[maps]'\n"
 
 
 @pytest.mark.parametrize(
