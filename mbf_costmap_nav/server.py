@@ -111,11 +111,13 @@ class CostmapNavigationServer(MapServer):
     @property
     def map_views(self) -> tuple[str, ...]:
         """Both maps."""
-        return ("global_costmap", "local_costmap")
+        return ("global_costmap", self.local_view)
+
+    local_view = "local_costmap"
 
     def map_view(self, name: str = "") -> GridView:
         """The costs of a map, of the global one without a name; 1 for what the robot's middle must not touch."""
-        costmap = (self.local_costmap if name == "local_costmap" else self.global_costmap).snapshot()
+        costmap = (self.local_costmap if name == self.local_view else self.global_costmap).snapshot()
         costs = np.divide(costmap.cells, np.float32(INSCRIBED), dtype=np.float32)
         costs[costmap.cells == UNKNOWN] = np.nan
         geometry = costmap.geometry
@@ -123,7 +125,7 @@ class CostmapNavigationServer(MapServer):
 
     def layer_costs(self, view: str, x: float, y: float) -> Mapping[str, float]:
         """The cost of a cell as each layer has left it; that of the last layer is the map's."""
-        costmap = self.local_costmap if view == "local_costmap" else self.global_costmap
+        costmap = self.local_costmap if view == self.local_view else self.global_costmap
         costs = costmap.costs_after_layers(x, y)
         return {name: math.nan if cost == UNKNOWN else cost / INSCRIBED for name, cost in costs.items()}
 

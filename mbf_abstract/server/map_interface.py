@@ -119,6 +119,9 @@ class MapInterface(PluginHost):
         """Names of what ``map_view`` can show: maps or layers, the one planners see first."""
         return ()
 
+    local_view: ClassVar[str] = ""
+    """Which of ``map_views`` shows the map around the robot only, and lies over the others; empty = none does."""
+
     def layer_costs(self, view: str, x: float, y: float) -> Mapping[str, float]:
         """Costs at a place [m] of one of ``map_views`` after each of its layers, in their order; for viewers.
 

@@ -23,6 +23,8 @@ class SensedCosts:
     numbers : (k,) int64
         Numbers of the vertices in the whole map, ascending.
     costs, lethal : (k,) float32, bool
+    places : (k, 3) float64
+        [m]
     box : Box
         Around them [m].
     """
@@ -30,6 +32,7 @@ class SensedCosts:
     numbers: NDArray[np.int64]
     costs: Float32Array
     lethal: BoolArray
+    places: FloatArray
     box: Box
 
     @classmethod
@@ -39,12 +42,21 @@ class SensedCosts:
             return NOTHING_SENSED
         order = np.argsort(numbers, kind="stable")
         low, high = places.min(axis=0).tolist(), places.max(axis=0).tolist()
-        return cls(numbers[order], costs[order], lethal[order], (*low, *high))
+        return cls(numbers[order], costs[order], lethal[order], places[order], (*low, *high))
 
     def is_same(self, other: SensedCosts) -> bool:
         """Whether the same vertices have the same values."""
         pairs = ((self.numbers, other.numbers), (self.costs, other.costs), (self.lethal, other.lethal))
         return all(np.array_equal(one, another) for one, another in pairs)
+
+    def differing(self, other: SensedCosts) -> NDArray[np.int64]:
+        """Numbers (k,) of the vertices whose values are not the same in both, ascending."""
+        either = np.union1d(self.numbers, other.numbers)
+        costs, lethal = np.full((2, len(either)), -1.0, dtype=np.float32), np.zeros((2, len(either)), dtype=np.bool_)
+        for row, one in enumerate((self, other)):
+            place = np.searchsorted(either, one.numbers)
+            costs[row, place], lethal[row, place] = one.costs, one.lethal
+        return np.asarray(either[(costs[0] != costs[1]) | (lethal[0] != lethal[1])])
 
     def laid_over(
         self, numbers: NDArray[np.int64], costs: Float32Array, lethal: BoolArray
@@ -63,5 +75,9 @@ class SensedCosts:
 
 
 NOTHING_SENSED = SensedCosts(
-    np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.float32), np.zeros(0, dtype=np.bool_), (0.0,) * 6
+    np.zeros(0, dtype=np.int64),
+    np.zeros(0, dtype=np.float32),
+    np.zeros(0, dtype=np.bool_),
+    np.zeros((0, 3)),
+    (0.0,) * 6,
 )

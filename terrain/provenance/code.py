@@ -41,18 +41,18 @@ def code_of(servers: Sequence[AbstractNavigationServer]) -> dict[str, Code]:
 
 def modules_of_plugins(config: Config, registry: PluginRegistry) -> Iterator[str]:
     """Modules of all plugins and layers of a configuration, also of those inside of other plugins."""
-    for kind, type_name in _types_of(config):
+    for kind, type_name in _types_of(config, f"{registry.backend}_layers"):
         yield registry.module_of(kind, type_name)
 
 
-def _types_of(config: Config) -> Iterator[tuple[PluginKind | str, str]]:
-    """Group and type of every plugin and layer, also of those inside of other plugins."""
+def _types_of(config: Config, layers: str) -> Iterator[tuple[PluginKind | str, str]]:
+    """Group and type of every plugin and layer, also of those inside of other plugins; the group of layers is given."""
     for spec in config.plugins:
         yield spec.kind, spec.type_name
         yield from _inner_types(spec.plugin_class, spec.parameters)
     for section in config.sections.values():
         for layer in section.layers:
-            yield f"{config.backend}_layers", layer.type_name
+            yield layers, layer.type_name
 
 
 def _inner_types(plugin_class: type[Plugin], parameters: ParameterModel) -> Iterator[tuple[PluginKind | str, str]]:

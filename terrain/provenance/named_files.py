@@ -36,6 +36,7 @@ FORMATS_OF_GLTF = {
 }  # by the list of objects with a ``uri``
 FILE_OF_URDF = re.compile(r"""(filename\s*=\s*)("[^"]*"|'[^']*')""")
 INPUTS = "inputs"
+FOLDER_KEY = "folder"
 MAX_NAME = 200  # bytes; a longer text is no file's name
 MAX_GLTF = 64_000_000  # bytes; a larger one holds its numbers itself
 
@@ -52,6 +53,23 @@ def named_files(value: Any, folder: Path) -> dict[str, Path]:
     """Texts in a value that name files, and those files, whatever mappings and lists it consists of."""
     found = ((text, named_file(text, folder)) for text in _texts(value))
     return {text: file for text, file in found if file is not None}
+
+
+def with_whole_folders(value: Any, folder: Path) -> Any:
+    """Return a configuration's value with absolute paths of the folders that its keys ``folder`` name.
+
+    They are maps of tiles, which are too large to be copied into a run; relative paths count from ``folder``.
+    """
+    if isinstance(value, list):
+        return [with_whole_folders(item, folder) for item in value]
+    if not isinstance(value, Mapping):
+        return value
+    return {
+        key: str(configured_file(folder, item).absolute())
+        if key == FOLDER_KEY and isinstance(item, str) and configured_file(folder, item).is_dir()
+        else with_whole_folders(item, folder)
+        for key, item in value.items()
+    }
 
 
 def _texts(value: Any) -> Iterator[str]:

@@ -34,7 +34,7 @@ from terrain.physics.actors import Fellow
 from terrain.physics.command_delay import CommandDelay
 from terrain.physics.incidents import ANY_COLLISION, COLLISIONS_WITH, Incident
 from terrain.physics.simulation import Simulation
-from terrain.provenance.named_files import InputCopies
+from terrain.provenance.named_files import InputCopies, with_whole_folders
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.scenarios.environment import with_noise
@@ -252,6 +252,7 @@ def write_navigation_config(
     document = read_yaml(target, [])  # what is wrong with it is reported when the server reads it
     if document is not None:
         renamed = inputs.renamed(document.data, source.parent, set(names.values()))
+        renamed = with_whole_folders(renamed, source.parent)
         if renamed != document.data:
             target.write_text(yaml.safe_dump(renamed, sort_keys=False))
     return target

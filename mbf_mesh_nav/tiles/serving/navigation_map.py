@@ -11,6 +11,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
+
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.view import GridView
 from mbf_mesh_nav.arrays import FlagArray
@@ -18,8 +20,9 @@ from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.tiles.portals import NOT_CANCELLED
+from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED, SensedCosts
 from mbf_mesh_nav.tiles.serving.moment import Moment
-from mbf_mesh_nav.tiles.serving.overview import overview
+from mbf_mesh_nav.tiles.serving.overview import overview, with_sensed
 from mbf_mesh_nav.tiles.serving.questions import TileQuestions
 from mbf_mesh_nav.tiles.serving.recently_used import RecentlyUsed
 from mbf_mesh_nav.tiles.serving.squares import Squares
@@ -29,6 +32,7 @@ from mbf_mesh_nav.tiles.tile import TileKey
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
 NO_WINDOW = "the map of tiles has no window around the robot"
+NO_VIEW = GridView(np.zeros((0, 0), dtype=np.float32), (0.0,) * 4)
 CANCEL_PERIOD = 0.05
 """How often [s] a goal that waits for the search of another one looks whether it is cancelled."""
 
@@ -70,6 +74,7 @@ class TiledNavigationMap(TileQuestions):
         self._window = None if window is None else FollowingWindow(tiled, self._squares, window)
         self._no_layers = LayerGraph()
         self._views: RecentlyUsed[str, GridView] = RecentlyUsed(self._picture, len(tiled.index.layers))
+        self._shown: tuple[GridView | None, SensedCosts, GridView] = None, NOTHING_SENSED, NO_VIEW  # the last picture
 
     @property
     def layers(self) -> LayerGraph:  # type: ignore[override]
@@ -159,14 +164,23 @@ class TiledNavigationMap(TileQuestions):
             self._window.renew()
 
     def view(self, layer: str) -> GridView:
-        """The costs of a layer from above; the first time, and after a change, all tiles are read for it.
+        """The costs of a layer from above, that of the profile with what sensors have raised.
+
+        The first time, and after a change of a tile, all tiles are read for it.
 
         Raises
         ------
         MeshError
             A tile is damaged.
         """
-        return self._views.get(layer)
+        stored = self._views.get(layer)
+        if layer != self.tiled.profile_layer or not self.senses:
+            return stored
+        sensed, (of_stored, of_sensed, shown) = self.moment().sensed, self._shown
+        if of_stored is not stored or of_sensed is not sensed:
+            shown = with_sensed(stored, sensed)
+            self._shown = stored, sensed, shown
+        return shown
 
     # -------------------------------------------------------------------------------------------------- layers
     def update(self, robot_pose: Pose | None, now: float) -> None:

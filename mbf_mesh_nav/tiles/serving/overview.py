@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbf_abstract.maps.view import GridView
-from mbf_mesh_nav.arrays import Float32Array
+from mbf_mesh_nav.arrays import Float32Array, FloatArray
+from mbf_mesh_nav.tiles.sensed import SensedCosts
 from mbf_mesh_nav.tiles.tiled_map import TiledMap, sound_tile
 
 MOST_PIXELS = 1000
@@ -33,12 +35,28 @@ def overview(tiled: TiledMap, row: int) -> GridView:
     for key in tiled.index.entries:
         tile = sound_tile(tiled.folder, tiled.index, key)
         core = tile.vertices[: tile.core_vertices]
-        column, line = (
-            np.floor((core[:, axis] - low) / side).astype(np.int64) for axis, low in ((0, left), (1, bottom))
-        )
         values = np.where(tile.lethal[row], np.float32(np.inf), tile.costs[row])
-        np.maximum.at(costs, line * columns + column, values)
+        np.maximum.at(costs, _pixels(core, left, bottom, side, columns), values)
     costs[np.isneginf(costs)] = np.nan
     costs.flags.writeable = False
     extent = (left, left + columns * side, bottom, bottom + rows * side)
     return GridView(costs.reshape(rows, columns), extent)
+
+
+def with_sensed(view: GridView, sensed: SensedCosts) -> GridView:
+    """A picture of the stored costs with those laid over it that sensors have raised."""
+    if not len(sensed.numbers):
+        return view
+    left, right, bottom, _ = view.extent
+    columns = view.costs.shape[1]
+    costs = view.costs.ravel().copy()
+    values = np.where(sensed.lethal, np.float32(np.inf), sensed.costs)
+    np.fmax.at(costs, _pixels(sensed.places, left, bottom, (right - left) / columns, columns), values)
+    costs.flags.writeable = False
+    return GridView(costs.reshape(view.costs.shape), view.extent)
+
+
+def _pixels(places: FloatArray, left: float, bottom: float, side: float, columns: int) -> NDArray[np.int64]:
+    """Numbers (n,), row by row, of the pixels of this side [m] that places (n, 3) [m] lie in."""
+    column, line = (np.floor((places[:, axis] - low) / side).astype(np.int64) for axis, low in ((0, left), (1, bottom)))
+    return np.asarray(line * columns + column)

@@ -189,7 +189,7 @@ class TileServer(MapServer):
         return tuple(sorted(tiled.index.layers, key=lambda name: name != shown))
 
     def map_view(self, name: str = "") -> GridView:
-        """The costs of a layer from above, of the cost profile's layer without a name; made once, of all tiles."""
+        """The costs of a layer from above, of the cost profile's layer with what sensors see without a name."""
         return self.tiled_map.view(name or self.map_views[0])
 
     @classmethod

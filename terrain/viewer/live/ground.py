@@ -44,15 +44,14 @@ class Ground:
         self._world = ground
         self._is_level = bool(np.ptp(ground.vertices[:, 2]) < FLAT_GROUND)
         self._is_grid = isinstance(navigation.map_view(), GridView)
-        names = navigation.map_views
-        shown_on_ground = names[:1] if self._is_grid else names
+        shown_on_ground = [name for name in navigation.map_views if name != navigation.local_view]
         gui = server_page.gui
         self._choice = gui.add_dropdown("colours", (*shown_on_ground, OWN_LOOK), hint="What the ground is coloured by")
         self._legend = gui.add_html("")
         self._drawn: tuple[str, int] | None = None  # which colours, and what the map was like
         self._base: Any = None
         self._frame = 0
-        self._local = Overlay(gui, "local map") if self._is_grid and len(names) > 1 else None
+        self._local = Overlay(gui, "local map") if navigation.local_view else None
         self._lethal = None if self._is_grid else Overlay(gui, "forbidden places")
 
     def show(self) -> None:
@@ -117,7 +116,7 @@ class Ground:
     def _show_local(self) -> None:
         if self._local is None:
             return
-        view = self._navigation.map_view(self._navigation.map_views[1])
+        view = self._navigation.map_view(self._navigation.local_view)
         if isinstance(view, GridView):
             key = (view.extent, hash(view.costs.tobytes()))
             self._local.update(key, lambda: self._draw_grid(view, "/local_map", LIFT))

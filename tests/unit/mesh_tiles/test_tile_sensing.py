@@ -221,3 +221,23 @@ def test_a_window_that_is_held_stays_until_it_is_released_and_is_stale_when_the_
             assert tiled.window_map is held and bool(tiled.stale_reason(0.1)) is not is_in
     tiled.update(pose(way[6]), 0.2)
     assert tiled.window_map is not held and not tiled.stale_reason(0.2)
+
+
+def test_the_picture_of_the_profile_shows_what_is_seen_and_those_of_other_layers_what_is_stored(tiled_hills, way):
+    tiled = sensing_map(tiled_hills)
+    tiled.update(pose(way[10]), 0.0)
+    stored, steepness = tiled.view("safe"), tiled.view("steepness")
+    left, right, bottom, _ = stored.extent
+    side = (right - left) / stored.costs.shape[1]
+    pixels = np.floor((way[8:15, :2] - (left, bottom)) / side).astype(int)
+    seen = 8 + int(np.argmax(np.isfinite(stored.costs[pixels[:, 1], pixels[:, 0]])))
+    column, row = pixels[seen - 8]
+    tiled.insert_scan(scan(way[10], way[seen][None] + (0.0, 0.0, 0.4), 0.1))
+    tiled.update(pose(way[10]), 0.1)
+    shown = tiled.view("safe")
+    assert shown is tiled.view("safe") and tiled.view("steepness") is steepness
+    assert np.isinf(shown.costs[row, column]) and np.isfinite(stored.costs[row, column])
+    raised = np.argwhere(np.isfinite(stored.costs) & (shown.costs != stored.costs))
+    assert np.abs((raised[:, ::-1] + 0.5) * side + (left, bottom) - way[seen][:2]).max() < 1.2 + side
+    tiled.clear()
+    assert np.array_equal(tiled.view("safe").costs, stored.costs, equal_nan=True)
