@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray
+from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, follow_predecessors, propagate_distances
 from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.tiles.places import TilePlace
@@ -73,6 +73,24 @@ class TiledPlan:
 def failed_plan(outcome: GetPathOutcome, message: str, tiles: tuple[TileKey, ...] = ()) -> TiledPlan:
     """A plan without a path."""
     return TiledPlan(outcome, message, NO_POINTS, NO_POINTS, np.inf, np.inf, tiles)
+
+
+def plan_along(
+    tiled: TiledMap,
+    chain: IntArray,
+    start: TilePlace,
+    goal: TilePlace,
+    cost: float,
+    least_cost: float,
+    tiles: tuple[TileKey, ...],
+) -> TiledPlan:
+    """A plan from a start over vertices (n,) of the pool to a goal; costs in metres."""
+    inner, inner_normals = tiled.pool.vertices[chain], tiled.pool.normals[chain].astype(np.float64)
+    positions = np.concatenate([start.point[None], inner, goal.point[None]])
+    normals = np.concatenate([start.normal[None], inner_normals, goal.normal[None]])
+    # A vertex that two tiles share is there twice.
+    kept = np.append(True, (positions[1:] != positions[:-1]).any(axis=1))
+    return TiledPlan(GetPathOutcome.SUCCESS, "", positions[kept], normals[kept], cost, least_cost, tiles)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,18 +230,11 @@ class CorridorSearch:
         if found is None:
             return replace(failed_plan(GetPathOutcome.NO_PATH_FOUND, "", tiles), least_cost=closed)
         chain, cost = found
-        inner, inner_normals = tiled.pool.vertices[chain], tiled.pool.normals[chain].astype(np.float64)
-        positions = np.concatenate([self._start.point[None], inner, self._goal.point[None]])
-        normals = np.concatenate([self._start.normal[None], inner_normals, self._goal.normal[None]])
-        # A vertex that two tiles share is there twice.
-        kept = np.append(True, (positions[1:] != positions[:-1]).any(axis=1))
         gain = narrower / cost - 1.0 if np.isfinite(narrower) else np.nan
-        least = min(cost, closed)
-        return TiledPlan(GetPathOutcome.SUCCESS, "", positions[kept], normals[kept], cost, least, tiles, gain)
+        plan = plan_along(tiled, chain, self._start, self._goal, cost, min(cost, closed), tiles)
+        return replace(plan, gain=gain)
 
-    def _cheapest(
-        self, graph: SearchGraph, tiles: tuple[TileKey, ...]
-    ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.int32]], float] | None:
+    def _cheapest(self, graph: SearchGraph, tiles: tuple[TileKey, ...]) -> tuple[IntArray, float] | None:
         """Vertices of the pool from start to goal, and the cost [m]; None without a path or if cancelled."""
         pool, (seeds, targets) = self._tiled.pool, (self._in_pool(place) for place in self._ends)
         distances, predecessors = pool.search_arrays(key for key in tiles if key not in self._searched)
@@ -243,5 +254,5 @@ class CorridorSearch:
             return None
         return follow_predecessors(predecessors, int(targets[totals.argmin()]))[::-1], float(totals.min())
 
-    def _in_pool(self, place: TilePlace) -> np.ndarray[tuple[int, ...], np.dtype[np.int32]]:
+    def _in_pool(self, place: TilePlace) -> IntArray:
         return (place.corners + self._tiled.pool.first_vertex(place.key)).astype(np.int32)

@@ -151,6 +151,11 @@ class TilePool:
         self._links[key] = np.array(columns, dtype=np.int64)
         self._slot_of[key] = slot
 
+    def shared(self, keys: Iterable[TileKey]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Numbers in the map and places in the pool (n,) of the shared vertices of loaded tiles, one for each tile."""
+        number, vertex, _, _ = np.concatenate([self._links[key] for key in keys], axis=1)
+        return number, vertex
+
     def corridor(self, tiles: dict[TileKey, BoolArray]) -> SearchGraph:
         """The graph of loaded tiles, joined at some portals of each.
 

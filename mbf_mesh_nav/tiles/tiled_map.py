@@ -10,15 +10,17 @@ needed. Both keep to ``memory``. Beside it stay the tiles with costs that sensor
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.map.layer import CostArray, LethalArray
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.tiles.index import TileIndex, read_index
+from mbf_mesh_nav.tiles.index import Box, TileIndex, read_index
 from mbf_mesh_nav.tiles.places import TilePlace, find_place
 from mbf_mesh_nav.tiles.pool import TilePool
 from mbf_mesh_nav.tiles.portals import PortalGraph, TilePortals, estimated_costs
@@ -52,6 +54,8 @@ class TiledMap:
     pool : TilePool
     table_bytes : int
         What the tables of portals take of the memory.
+    changes : int
+        How many times ``change_layer`` has changed a tile.
 
     Raises
     ------
@@ -78,8 +82,14 @@ class TiledMap:
             text = f"its tiles need {least:.3g} MB of memory, allowed are {memory / 1e6:.3g} MB"
             raise MeshError(str(folder), [text])
         self._kept: OrderedDict[TileKey, tuple[Tile, TileGraph]] = OrderedDict()
+        self.changes = 0
         self._sensed = NOTHING_SENSED
         self._raised: dict[TileKey, tuple[Tile, TileGraph]] = {}  # tiles with sensed costs, and weights with them
+
+    @property
+    def sensed(self) -> SensedCosts:
+        """The sensed costs that plans are made with, see ``lay_over``."""
+        return self._sensed
 
     @property
     def profile_layer(self) -> str:
@@ -119,6 +129,26 @@ class TiledMap:
         for key, weighed in (*freed.items(), *raised.items()):
             if self.pool.holds(key):
                 self.pool.reweigh(key, *weighed)
+
+    def vertices_in_pool(
+        self, numbers: NDArray[np.int64], keys: Iterable[TileKey], boxes: Iterable[Box]
+    ) -> IntArray | None:
+        """Places in the pool of vertices with numbers (n,) in the map, ascending, which lie in the boxes.
+
+        Looked for on some loaded tiles; None if one of them is on none of those.
+        """
+        if not len(numbers):
+            return np.zeros(0, dtype=np.int32)
+        near = {key for box in boxes for key in self.index.tiles_in(box)}.intersection(keys)
+        places, is_found = [], np.zeros(len(numbers), dtype=np.bool_)
+        for key in sorted(near):
+            own = self.tile(key)[0]
+            number = own.numbers[: own.core_vertices]
+            place = np.minimum(np.searchsorted(numbers, number), len(numbers) - 1)
+            here = np.flatnonzero(numbers[place] == number)
+            is_found[place[here]] = True
+            places.append(here + self.pool.first_vertex(key))
+        return np.concatenate(places).astype(np.int32) if is_found.all() else None
 
     def find_place(self, position: FloatArray, reach: float) -> TilePlace | None:
         """The place on the surface nearest to a position (3,) [m], as ``borders.on_surface``; None off the surface.
@@ -162,6 +192,7 @@ class TiledMap:
             if (seen := self.index.layer_of(profile)) == row:
                 passing[place] = costs_between_portals(tile, tile.costs[seen], tile.lethal[seen], profile)
         tile = replace(tile, portal_costs=passing)
+        self.changes += 1
         write_tile(tile_file(self.folder, key), tile)
         changed = TilePortals(tile.portals, passing[self._profile_row])
         self.portals.change(key, changed)
