@@ -3,7 +3,8 @@
     python benchmarks/tiles_sensing.py [--sides 1001,2001] [--metres 60] [--json]
 
 A robot drives ``--metres`` over the terrain of ``benchmarks/tiles.py``, tiles of 256 m, a scan of 2000 points with
-boxes around it every metre, and a plan of 200 m every 5 m. Times are of the CPU, medians with the worst in brackets.
+boxes around it every metre, and a plan of 200 m every 5 m, searched and, to a goal that stays, by repair where that is
+as good. Times are of the CPU, medians with the worst in brackets.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_mesh_nav.map.map_builder import MeshLayerEntry
 from mbf_mesh_nav.tiles.build import build_tiles
-from mbf_mesh_nav.tiles.planning import plan_on_tiles
+from mbf_mesh_nav.tiles.planning import plan_between, plan_on_tiles
+from mbf_mesh_nav.tiles.portals import NOT_CANCELLED
+from mbf_mesh_nav.tiles.serving.corridor_field import CorridorField
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
 from mbf_mesh_nav.tiles.serving.window_settings import window_settings
 from mbf_mesh_nav.tiles.sources import HeightSource, open_heights
@@ -69,8 +72,10 @@ def drive(folder: Path, metres: int) -> dict[str, Any]:
     navigation_map = TiledNavigationMap(tiled, window=window_settings(tiled, WINDOW, LAYERS, BLOCKS))
     left, bottom, _, right, top, _ = tiled.index.box
     rng, before = np.random.default_rng(3), megabytes()
-    times: dict[str, list[float]] = {name: [] for name in ("scan_to_cost", "new_window", "overlay", "plan", "again")}
-    vertices, sensed = [], []
+    names = ("scan_to_cost", "new_window", "overlay", "plan", "again", "repaired", "not_repaired")
+    times: dict[str, list[float]] = {name: [] for name in names}
+    vertices, sensed, above = [], [], [0.0]
+    kept, goal = CorridorField(tiled), None
     for step in range(metres):
         x, y, now = 0.5 * (left + right) - 0.5 * metres + step, 0.5 * (bottom + top), float(step)
         ground = navigation_map.ground_heights(x, y) or (0.0,)
@@ -96,6 +101,14 @@ def drive(folder: Path, metres: int) -> dict[str, Any]:
             shown, stored = navigation_map.window_map.snapshot(), navigation_map.layers[tiled.profile_layer]
             sensed.append(int(((shown.costs > stored.costs) | (shown.lethal & ~stored.lethal)).sum()))
             ends = np.array(robot.position), np.array((x + PLAN_LENGTH, y, ground[0]))
+            start = tiled.find_place(ends[0], 60.0)
+            goal = goal or tiled.find_place(ends[1], 60.0)
+            begun = time.process_time()
+            ours = kept.plan(start, goal, 0.03, NOT_CANCELLED)
+            times["repaired" if "repaired" in ours.message else "not_repaired"].append(
+                1e3 * (time.process_time() - begun)
+            )
+            above.append(ours.cost / plan_between(tiled, start, goal).cost - 1.0)
             for name in ("plan", "again"):
                 times[name].append(timed(lambda ends=ends: plan_on_tiles(tiled, *ends, surface_distance=60.0)))  # type: ignore[misc]
     figures = {f"{name}_ms": (float(np.median(all_)), max(all_)) for name, all_ in times.items() if all_}
@@ -103,6 +116,8 @@ def drive(folder: Path, metres: int) -> dict[str, Any]:
         **figures,
         "window_vertices": max(vertices),
         "sensed_vertices": max(sensed),
+        "repairs": len(times["repaired"]),
+        "repaired_above_searched": max(above),
         "raised_tiles": len(tiled._raised),
         "megabytes_at_the_start": before,
         "megabytes_at_the_end": megabytes(),
