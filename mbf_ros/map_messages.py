@@ -99,11 +99,7 @@ class GridMessages(MapMessages):
         super().__init__(*arguments)
         self._updates = Output(f"{self._name}/costmap_updates", "map_msgs/OccupancyGridUpdate")
         self._grid = Output(
-            f"{self._name}/costmap",
-            "nav_msgs/OccupancyGrid",
-            Quality.LATCHED,
-            depth=1,
-            outdates=self._updates.topic,
+            f"{self._name}/costmap", "nav_msgs/OccupancyGrid", Quality.LATCHED, depth=1, outdates=self._updates.topic
         )
         self.outputs = (self._grid, self._updates)
         self._cells: NDArray[np.int8] | None = None
@@ -174,9 +170,7 @@ def _is_same(view: MeshView, sent: MeshView, with_costs: bool) -> bool:
 
 
 def map_messages(
-    server: AbstractNavigationServer,
-    context: Callable[[], MessageContext],
-    audience: Callable[[str], Audience],
+    server: AbstractNavigationServer, context: Callable[[], MessageContext], audience: Callable[[str], Audience]
 ) -> list[MapMessages]:
     """Return the messages of all costmaps of a server; of a mesh those of the layer that planners see."""
     if server.map_view_type is MeshView:

@@ -43,9 +43,7 @@ def plan(
     tolerance: float = typer.Option(0.0, "--tolerance", min=0.0, help="How far from the goal the path may end [m]."),
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object, with all poses."),
     unknown: Unknown | None = typer.Option(
-        None,
-        "--unknown",
-        help="Whether unknown cells of a bare map are free (the default, with a note) or lethal.",
+        None, "--unknown", help="Whether unknown cells of a bare map are free (the default, with a note) or lethal."
     ),
     png: Path | None = typer.Option(None, "--png", help="Draw map and path into this file."),
 ) -> None:

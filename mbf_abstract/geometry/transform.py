@@ -143,11 +143,7 @@ def rotate(q: Quaternion, v: Vector3) -> Vector3:
     """Rotate a vector by a unit quaternion: ``v + 2 u x (u x v + w v)`` with ``q = (u, w)``."""
     x, y, z, w = q
     cx, cy, cz = y * v[2] - z * v[1] + w * v[0], z * v[0] - x * v[2] + w * v[1], x * v[1] - y * v[0] + w * v[2]
-    return (
-        v[0] + 2.0 * (y * cz - z * cy),
-        v[1] + 2.0 * (z * cx - x * cz),
-        v[2] + 2.0 * (x * cy - y * cx),
-    )
+    return (v[0] + 2.0 * (y * cz - z * cy), v[1] + 2.0 * (z * cx - x * cz), v[2] + 2.0 * (x * cy - y * cx))
 
 
 def slerp(a: Quaternion, b: Quaternion, ratio: float) -> Quaternion:

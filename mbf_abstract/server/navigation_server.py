@@ -131,11 +131,7 @@ class AbstractNavigationServer(MapInterface):
             runtime.clock.hang_guard = parameters.hang_guard
 
     def warm_up(
-        self,
-        start: Pose,
-        goal: Pose,
-        on_step: Callable[[str], None] = lambda text: None,
-        only_defaults: bool = False,
+        self, start: Pose, goal: Pose, on_step: Callable[[str], None] = lambda text: None, only_defaults: bool = False
     ) -> None:
         """Call every planner and controller once, without moving, so that their kernels are compiled before a goal.
 

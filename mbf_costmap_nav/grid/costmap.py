@@ -129,10 +129,7 @@ class GridGeometry:
 
     def cell_to_world(self, ix: int, iy: int) -> tuple[float, float]:
         """Centre (x, y) [m] of a cell."""
-        return (
-            self.origin_x + (ix + 0.5) * self.resolution,
-            self.origin_y + (iy + 0.5) * self.resolution,
-        )
+        return (self.origin_x + (ix + 0.5) * self.resolution, self.origin_y + (iy + 0.5) * self.resolution)
 
     def cells_to_world(self, cells: ArrayLike) -> NDArray[np.float64]:
         """Centres (n, 2) [m] of many cells (n, 2)."""

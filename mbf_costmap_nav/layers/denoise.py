@@ -64,9 +64,7 @@ class DenoiseLayer(CostmapLayer):
         self._obstacles[box.slices] = obstacles
         around = box.grown(self.parameters.minimal_group_size).clipped(self.geometry.box)
         noise = small_groups(
-            self._obstacles[around.slices],
-            self.parameters.minimal_group_size,
-            self.parameters.group_connectivity_type,
+            self._obstacles[around.slices], self.parameters.minimal_group_size, self.parameters.group_connectivity_type
         )
         x, y = box.x0 - around.x0, box.y0 - around.y0
         window[noise[y : y + box.y1 - box.y0, x : x + box.x1 - box.x0]] = FREE

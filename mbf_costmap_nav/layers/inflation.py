@@ -91,10 +91,7 @@ class InflationLayer(CostmapLayer):
                 f"at most {LARGEST_RADIUS} are possible"
             )
         self._cost_of_square = cost_table(
-            self._radius,
-            self.geometry.resolution,
-            self._inscribed_radius,
-            self.parameters.cost_scaling_factor,
+            self._radius, self.geometry.resolution, self._inscribed_radius, self.parameters.cost_scaling_factor
         )
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:

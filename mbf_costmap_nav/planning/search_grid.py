@@ -37,8 +37,7 @@ class GridPlannerParameters(PluginParameters):
     )
     allow_unknown: bool = parameter(True, "Plan through unknown cells, counted like cost 252.")
     check_footprint: bool = parameter(
-        True,
-        "Check the robot's outline on the path and its turns at the ends; plan a manoeuvre where it does not fit.",
+        True, "Check the robot's outline on the path and its turns at the ends; plan a manoeuvre where it does not fit."
     )
     max_manoeuvre_states: int = parameter(
         20_000, "The search for a manoeuvre gives up after so many states.", ge=100, le=10_000_000

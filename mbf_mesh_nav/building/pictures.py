@@ -134,7 +134,4 @@ def error_picture(surface: BuiltSurface) -> tuple[bytes, str]:
     span = max(float(np.percentile(np.abs(means), 95.0)), 0.001) if len(means) else 0.001
     view = PlanView(patches.grid)
     view.fill(seen, scaled_colours(means, -span, span))
-    return (
-        view.png(),
-        f"Mean distance of the points: blue {span:.3f} m below, red as much above, pale none.",
-    )
+    return (view.png(), f"Mean distance of the points: blue {span:.3f} m below, red as much above, pale none.")

@@ -11,13 +11,7 @@ from mbf_abstract.whole_files import write_whole
 from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
 from mbf_mesh_nav.building.farthest_plan import FarthestPlan, plan_farthest
 from mbf_mesh_nav.building.map_facts import MapFacts, lines_of
-from mbf_mesh_nav.building.pictures import (
-    change_picture,
-    density_picture,
-    error_picture,
-    height_picture,
-    level_picture,
-)
+from mbf_mesh_nav.building.pictures import change_picture, density_picture, error_picture, height_picture, level_picture
 from mbf_mesh_nav.building.surface import BuiltSurface
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 

@@ -13,14 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from mbf_abstract.geometry.arithmetic import tan
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.building.heights import (
-    HeightLimits,
-    fitted,
-    noise_of_points,
-    settled,
-    smoothed,
-    without_false_ground,
-)
+from mbf_mesh_nav.building.heights import HeightLimits, fitted, noise_of_points, settled, smoothed, without_false_ground
 from mbf_mesh_nav.building.holes import without_holes
 from mbf_mesh_nav.building.outliers import isolated_points
 from mbf_mesh_nav.building.surface_patches import Grid, SurfacePatches

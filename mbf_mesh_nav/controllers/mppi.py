@@ -33,13 +33,7 @@ from mbf_mesh_nav.kernels.motion.mppi import score_rollouts
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.positions import vector_of
-from mbf_mesh_nav.motion.goal_approach import (
-    GoalApproach,
-    braking_speed,
-    clamp,
-    missed_path,
-    tracker_on_surface,
-)
+from mbf_mesh_nav.motion.goal_approach import GoalApproach, braking_speed, clamp, missed_path, tracker_on_surface
 from mbf_mesh_nav.motion.surface_follower import SurfaceFollower
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.search.final_approach import with_final_approach, with_first_turn
@@ -200,8 +194,7 @@ class MPPIController(SurfaceFollower):
     def _best_motion(self, spot: SurfacePoint, pose: Pose) -> FloatArray | None:
         """Blend the sampled motions by their scores; (time_steps, 2), or None if no motion makes progress."""
         max_speed = min(
-            self.parameters.max_vel_x,
-            max(braking_speed(self._tracker.to_cusp, self.parameters.decel_lim_x), 0.1),
+            self.parameters.max_vel_x, max(braking_speed(self._tracker.to_cusp, self.parameters.decel_lim_x), 0.1)
         )
         # A robot beside its goal or past it has no path ahead of it, but still a distance to drive.
         end = self._tracker.point_at(self._tracker.next_cusp)

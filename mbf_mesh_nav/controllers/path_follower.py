@@ -23,13 +23,7 @@ from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter
 from mbf_mesh_nav.mesh.borders import beyond_border
-from mbf_mesh_nav.motion.goal_approach import (
-    GoalApproach,
-    braking_speed,
-    clamp,
-    missed_path,
-    tracker_on_surface,
-)
+from mbf_mesh_nav.motion.goal_approach import GoalApproach, braking_speed, clamp, missed_path, tracker_on_surface
 from mbf_mesh_nav.motion.surface_follower import SurfaceFollower
 
 OBSTACLE_STEP = 0.1  # m between two looks along the path

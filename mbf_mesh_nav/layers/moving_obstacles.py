@@ -26,11 +26,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.maps.tracking.moving_obstacles import (
-    MovingObstacles,
-    MovingObstaclesParameters,
-    predicted_places,
-)
+from mbf_abstract.maps.tracking.moving_obstacles import MovingObstacles, MovingObstaclesParameters, predicted_places
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import FloatArray, IntArray

@@ -54,10 +54,7 @@ class TiltParameters(HeightErrorParameters):
         0.0, "Ground that allows a smaller share of headings is lethal; 0 = any one will do, 1 = all.", ge=0.0, le=1.0
     )
     preferred_headings: float = parameter(
-        0.0,
-        "Ground that allows a smaller share of headings costs 1; no effect below needed_headings.",
-        ge=0.0,
-        le=1.0,
+        0.0, "Ground that allows a smaller share of headings costs 1; no effect below needed_headings.", ge=0.0, le=1.0
     )
 
     @property

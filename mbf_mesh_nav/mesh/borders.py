@@ -36,10 +36,7 @@ def beyond_border(
 
 
 def on_surface(
-    topology: MeshTopology,
-    locator: SurfaceLocator,
-    position: FloatArray | tuple[float, ...],
-    reach: float,
+    topology: MeshTopology, locator: SurfaceLocator, position: FloatArray | tuple[float, ...], reach: float
 ) -> SurfacePoint | None:
     """Return the surface point of a position at most ``reach`` [m] above or below it, None also past a border."""
     point = locator.locate_one(position, reach)

@@ -54,11 +54,7 @@ UPSIDE_DOWN_SHARE = 0.5
 
 
 def checked_mesh(
-    vertices: ArrayLike,
-    faces: ArrayLike,
-    repair: Sequence[str] = (),
-    file: str = "arrays",
-    join_distance: float = 0.0,
+    vertices: ArrayLike, faces: ArrayLike, repair: Sequence[str] = (), file: str = "arrays", join_distance: float = 0.0
 ) -> tuple[CheckedMesh, MeshReport]:
     """Check a mesh and apply the allowed repairs.
 

@@ -18,12 +18,7 @@ from mbf_mesh_nav.kernels.search.heading_astar import HEADING_STEP, HEADINGS
 from mbf_mesh_nav.layers.tilt import heading_index
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.locate import SurfacePoint
-from mbf_mesh_nav.mesh.surface_point import (
-    corner_distances,
-    nearest_corner,
-    passes_blocked_corner,
-    point_of_face,
-)
+from mbf_mesh_nav.mesh.surface_point import corner_distances, nearest_corner, passes_blocked_corner, point_of_face
 from mbf_mesh_nav.search.drive_graph import DriveGraph
 from mbf_mesh_nav.search.heading_limits import HeadingLimits
 from mbf_mesh_nav.search.leg_search import LegQuery

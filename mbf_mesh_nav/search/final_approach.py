@@ -44,11 +44,7 @@ def with_first_turn(path: Path, mesh_map: MeshMap, blocked: BoolArray, turning_r
 
 
 def with_final_approach(
-    path: Path,
-    mesh_map: MeshMap,
-    blocked: BoolArray,
-    turning_radius: float,
-    small_corner: float = _SMALL_CORNER,
+    path: Path, mesh_map: MeshMap, blocked: BoolArray, turning_radius: float, small_corner: float = _SMALL_CORNER
 ) -> Path:
     """Bend the end of a path so that it arrives with the heading of its last pose.
 

@@ -103,10 +103,7 @@ def search_graph(mesh_map: MeshMap, weights: Float32Array, blocked: BoolArray) -
 
 
 def seeded_arrays(
-    mesh_map: MeshMap,
-    blocked: BoolArray,
-    source: SurfacePoint,
-    snapshot: MeshSnapshot | None = None,
+    mesh_map: MeshMap, blocked: BoolArray, source: SurfacePoint, snapshot: MeshSnapshot | None = None
 ) -> tuple[Float32Array, IntArray, IntArray]:
     """Start state of a search from a surface point: distances (V,), predecessors (V,), seed vertices.
 
@@ -126,11 +123,7 @@ def threshold_step(mesh_map: MeshMap) -> float:
 
 
 def vertex_path_leg(
-    mesh_map: MeshMap,
-    query: LegQuery,
-    distances: Float32Array,
-    predecessors: IntArray,
-    rooted_at_goal: bool = False,
+    mesh_map: MeshMap, query: LegQuery, distances: Float32Array, predecessors: IntArray, rooted_at_goal: bool = False
 ) -> Leg | None:
     """Leg along the predecessors of a search from ``query.start``, or from the goal; None without a path.
 

@@ -231,11 +231,7 @@ class WaveSearch:
         return self._written(snapshot, everything, of_corners, cancel_flag)
 
     def _written(
-        self,
-        snapshot: MeshSnapshot,
-        changed: IntArray,
-        of_corners: Float32Array,
-        cancel_flag: FlagArray,
+        self, snapshot: MeshSnapshot, changed: IntArray, of_corners: Float32Array, cancel_flag: FlagArray
     ) -> _Weights | None:
         """Bring weights (3F, 3) up to date at the changed vertices."""
         mesh_map = self._mesh_map

@@ -103,11 +103,7 @@ def mesh_geometry(view: MeshView, uuid: str, frame_id: str, stamp: float, contex
     return {
         "header": context.header(frame_id, stamp),
         "uuid": uuid,
-        "mesh_geometry": {
-            "vertices": points(view.vertices),
-            "vertex_normals": [],
-            "faces": triangles(view.faces),
-        },
+        "mesh_geometry": {"vertices": points(view.vertices), "vertex_normals": [], "faces": triangles(view.faces)},
     }
 
 

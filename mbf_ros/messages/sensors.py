@@ -107,12 +107,7 @@ def _ends(ranges: FloatArray, angles: FloatArray) -> FloatArray:
 
 
 def _scan(
-    message: Message,
-    context: MessageContext,
-    source: str,
-    received: float,
-    ends: FloatArray,
-    hits: NDArray[np.bool_],
+    message: Message, context: MessageContext, source: str, received: float, ends: FloatArray, hits: NDArray[np.bool_]
 ) -> RangeScan:
     header = message["header"]
     stamp = context.stamp(header["stamp"]) or received

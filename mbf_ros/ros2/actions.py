@@ -17,13 +17,7 @@ from typing import Any, TypeAlias
 from mbf_abstract.event_values import error_text
 from mbf_abstract.goals.goal_types import ActionResult
 from mbf_abstract.goals.handle import AnyGoalHandle, GoalStatus
-from mbf_abstract.outcomes import (
-    ExePathOutcome,
-    GetPathOutcome,
-    MoveBaseOutcome,
-    RecoveryOutcome,
-    RefinePathOutcome,
-)
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_ros.messages import mbf_actions
 from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal
 from mbf_ros.messages.geometry import MessageContext
@@ -90,12 +84,7 @@ class ServedAction:
     """
 
     def __init__(
-        self,
-        node: Any,
-        name: str,
-        mapping: ActionMapping[Any, Any],
-        outcomes: Outcomes,
-        serving: Serving,
+        self, node: Any, name: str, mapping: ActionMapping[Any, Any], outcomes: Outcomes, serving: Serving
     ) -> None:
         from rclpy.action import ActionServer
 

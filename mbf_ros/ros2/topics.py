@@ -12,12 +12,7 @@ from mbf_abstract.time.clock import Clock, WallClock
 from mbf_abstract.time.ticker import Ticker
 from mbf_ros.map_messages import Audience, Output
 from mbf_ros.messages.cdr import serialized
-from mbf_ros.messages.geometry import (
-    MessageContext,
-    command_twist,
-    twist,
-    twist_stamped,
-)
+from mbf_ros.messages.geometry import MessageContext, command_twist, twist, twist_stamped
 from mbf_ros.messages.interfaces import MessageError
 from mbf_ros.navigator_messages import NavigatorMessages
 from mbf_ros.robot_inputs import Input, Quality

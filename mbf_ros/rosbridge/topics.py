@@ -149,12 +149,7 @@ class TopicTable:
     ) -> None:
         """Add a topic that the navigator publishes; a latched one sends its last message to new subscribers."""
         self._topics[name] = Topic(
-            full_name(type_name),
-            is_ours=True,
-            is_shared=shared,
-            outdates=outdates,
-            keeps_last=latched,
-            depth=depth,
+            full_name(type_name), is_ours=True, is_shared=shared, outdates=outdates, keeps_last=latched, depth=depth
         )
 
     def add_input(self, name: str, type_name: str, on_message: Callable[[Message], None]) -> None:

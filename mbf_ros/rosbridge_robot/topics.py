@@ -67,11 +67,7 @@ class RobotTopics:
     """
 
     def __init__(
-        self,
-        now: Callable[[], float],
-        context: Callable[[], MessageContext],
-        arrivals: Arrivals,
-        reports: Reports,
+        self, now: Callable[[], float], context: Callable[[], MessageContext], arrivals: Arrivals, reports: Reports
     ) -> None:
         self._now, self._context, self._arrivals, self._reports = now, context, arrivals, reports
         self._subscriptions: dict[str, Subscription] = {}

@@ -53,10 +53,7 @@ def run(
     out: Path | None = typer.Option(None, "--out", help="Folder for the results; runs/<time> if not given."),
     map_file: Path | None = typer.Option(None, "--map", help="Drive in the building of this map_server yaml instead."),
     planner: str = typer.Option(
-        "",
-        "--planner",
-        help="Planner to use: a name in the configuration, or a type.",
-        autocompletion=complete_planner,
+        "", "--planner", help="Planner to use: a name in the configuration, or a type.", autocompletion=complete_planner
     ),
     controller: str = typer.Option(
         "", "--controller", help="Controller to use, likewise.", autocompletion=complete_controller

@@ -167,11 +167,7 @@ def _distance_from_axis(frame: FloatArray, centre: FloatArray) -> float:
 
 
 def _fixed_supports(
-    urdf: Urdf,
-    frames: Mapping[str, FloatArray],
-    wheels: list[Wheel],
-    casters: tuple[Support, ...],
-    ground: float,
+    urdf: Urdf, frames: Mapping[str, FloatArray], wheels: list[Wheel], casters: tuple[Support, ...], ground: float
 ) -> tuple[Support, ...]:
     """Shapes on the ground that no wheel turns: each is a support below its middle."""
     if not wheels:

@@ -38,9 +38,7 @@ class PolicyParameters(PluginParameters):
         0.5, "The robot stops where the newest scan of a sensor is older; 0 = never.", unit="s", ge=0.0, le=60.0
     )
     sources: tuple[str, ...] = parameter(
-        (),
-        "Sensors that are observed, each of which must send scans; empty = all that have sent any.",
-        dynamic=False,
+        (), "Sensors that are observed, each of which must send scans; empty = all that have sent any.", dynamic=False
     )
     check_ahead_time: float = parameter(
         0.5,

@@ -84,13 +84,7 @@ class Walls:
         return limit
 
 
-def distance_to_meeting(
-    offset: Vector,
-    velocity: Vector,
-    direction: Vector,
-    speed: float,
-    reach: float,
-) -> float:
+def distance_to_meeting(offset: Vector, velocity: Vector, direction: Vector, speed: float, reach: float) -> float:
     """How far [m] somebody can walk before it meets a circle that keeps its velocity.
 
     Parameters

@@ -13,14 +13,7 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.drive.robot import Odometry
-from mbf_abstract.geometry import (
-    AckermannCommand,
-    Command,
-    Pose,
-    Twist,
-    Vector3,
-    rotation_matrix,
-)
+from mbf_abstract.geometry import AckermannCommand, Command, Pose, Twist, Vector3, rotation_matrix
 from mbf_abstract.geometry.arithmetic import cross_product, rotated, rotated_back
 from terrain.physics.bullet import quiet_native_output
 from terrain.physics.drive import STEERING_SPEED, commanded_twist, twist_from_wheels, wheel_targets

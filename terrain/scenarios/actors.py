@@ -15,15 +15,7 @@ from scipy import ndimage
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.parameters import ParameterModel, parameter
-from terrain.physics.actors import (
-    PERSON,
-    PERSON_HEIGHT,
-    PERSON_RADIUS,
-    Body,
-    RouteWalker,
-    SlidingDoor,
-    other_robot,
-)
+from terrain.physics.actors import PERSON, PERSON_HEIGHT, PERSON_RADIUS, Body, RouteWalker, SlidingDoor, other_robot
 from terrain.physics.people import Person, Walls
 from terrain.physics.robot_models import ROBOTS
 from terrain.scenarios.obstacles import Size

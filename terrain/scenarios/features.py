@@ -76,12 +76,7 @@ class Steps(ParameterModel):
 Feature = Annotated[Ridge | Crater | Ruts | Road | Boulders | Steps, Field(discriminator="type")]
 
 
-def put_on(
-    terrain: Heightfield,
-    feature: Feature,
-    rng: np.random.Generator,
-    keep_clear: FloatArray,
-) -> Heightfield:
+def put_on(terrain: Heightfield, feature: Feature, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
     """Return the terrain with a feature; boulders are drawn from ``rng`` and leave the places (n, 2) [m] clear."""
     f = feature  # short, for the calls below
     if isinstance(f, Ridge):

@@ -164,12 +164,7 @@ def _check_places(scenario: Scenario, world: ScenarioWorld, document: YamlDocume
 
 
 def _check_server(
-    source: Path,
-    robot: RobotChoice,
-    maps: Maps,
-    settings: Mapping[str, str],
-    folder: Path,
-    findings: list[Finding],
+    source: Path, robot: RobotChoice, maps: Maps, settings: Mapping[str, str], folder: Path, findings: list[Finding]
 ) -> list[str]:
     """Read the maps and construct the plugins of a configuration; returns the notes of its server."""
     with _Collecting(findings, source) as collecting:

@@ -62,10 +62,7 @@ def degree_lengths(latitude: float) -> tuple[float, float]:
 
 
 def jacksboro(
-    size_m: float = 100.0,
-    spacing: float | None = None,
-    roughness: float = 0.0,
-    rng: np.random.Generator | None = None,
+    size_m: float = 100.0, spacing: float | None = None, roughness: float = 0.0, rng: np.random.Generator | None = None
 ) -> Heightfield:
     """Real terrain: the Jacksboro fault (Tennessee), shrunk in all three directions to ``size_m`` [m] along x.
 

@@ -36,11 +36,7 @@ class Blockage:
 
 
 def blockages(
-    box: RobotBox,
-    path: Path,
-    objects: Iterable[TrackedObject],
-    within_time: float,
-    same_storey: float = SAME_STOREY,
+    box: RobotBox, path: Path, objects: Iterable[TrackedObject], within_time: float, same_storey: float = SAME_STOREY
 ) -> tuple[Blockage, ...]:
     """Objects that block a path, in the order of their places along it.
 

@@ -27,12 +27,7 @@ Closeness = NDArray[np.uint16]
 
 
 def inflate(
-    cells: Cells,
-    seeds: Cells,
-    box: tuple[int, int, int, int],
-    cost_of_square: Cells,
-    radius: int,
-    unknown_from: int,
+    cells: Cells, seeds: Cells, box: tuple[int, int, int, int], cost_of_square: Cells, radius: int, unknown_from: int
 ) -> None:
     """Raise the cells of a box to the cost of their distance to the nearest seed.
 

@@ -26,14 +26,7 @@ from numpy.typing import NDArray
 from mbf_costmap_nav.kernels.compiled import kernel
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FIRST_CAPACITY, FOUND
 from mbf_costmap_nav.kernels.search.open_list import IDLE, RING, bucket_width, enlarged_if_full
-from mbf_costmap_nav.kernels.search.padded_grid import (
-    CELLS_PER_POLL,
-    INF,
-    SQRT2,
-    Integer,
-    PaddedGrid,
-    octile_distance,
-)
+from mbf_costmap_nav.kernels.search.padded_grid import CELLS_PER_POLL, INF, SQRT2, Integer, PaddedGrid, octile_distance
 from mbf_costmap_nav.kernels.search.short_lines import (
     BASE,
     CROSSED,

@@ -42,12 +42,7 @@ def face_below(surface: Surface, face: int, x: float, y: float) -> int:
 
 @inner_kernel
 def wheel_heights(
-    surface: Surface,
-    start_face: int,
-    centre: FloatArray,
-    angles: FloatArray,
-    radius: float,
-    heights: FloatArray,
+    surface: Surface, start_face: int, centre: FloatArray, angles: FloatArray, radius: float, heights: FloatArray
 ) -> None:
     """Write the surface's z [m] at ``radius`` around ``centre`` in the ascending directions ``angles``; NaN = none."""
     face, vertices, normals = start_face, surface.vertices, surface.face_normals

@@ -77,12 +77,7 @@ def greatest_use(
         left = (0.5 if wheel < 2 else -0.5) * chassis.track
         scratch.wheels[wheel, 0] = start[0] + cosine * forward - sine * left
         scratch.wheels[wheel, 1] = start[1] + sine * forward + cosine * left
-        below = face_below(
-            surface,
-            face,
-            scratch.wheels[wheel, 0],
-            scratch.wheels[wheel, 1],
-        )
+        below = face_below(surface, face, scratch.wheels[wheel, 0], scratch.wheels[wheel, 1])
         if below < 0:
             return np.inf
         scratch.wheel_faces[wheel] = below
@@ -156,11 +151,7 @@ def stride_use(surface: Surface, chassis: Chassis, scratch: Scratch, begin: int,
             corners = surface.faces[beyond]
             if corners[0] == end or corners[1] == end or corners[2] == end:
                 a, b = row(surface.vertices, Count(left)), row(surface.vertices, Count(right))
-                crossing = (
-                    a[0] + share * (b[0] - a[0]),
-                    a[1] + share * (b[1] - a[1]),
-                    a[2] + share * (b[2] - a[2]),
-                )
+                crossing = (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * (b[2] - a[2]))
                 first = greatest_use(surface, chassis, scratch, face, start, crossing, x / length, y / length)
                 last = greatest_use(surface, chassis, scratch, beyond, crossing, goal, x / length, y / length)
                 return max(first, last)
@@ -309,14 +300,7 @@ def _highest_below(
 
 @inner_kernel
 def _plane_at(
-    surface: Surface,
-    chassis: Chassis,
-    scratch: Scratch,
-    moment: float,
-    x: float,
-    y: float,
-    forward: float,
-    left: float,
+    surface: Surface, chassis: Chassis, scratch: Scratch, moment: float, x: float, y: float, forward: float, left: float
 ) -> float:
     """Height [m] of the plane of the wheels at a place of the body."""
     middle, rise_forward, rise_left, _ = _plane(surface, chassis, scratch, moment, x, y)

@@ -79,11 +79,7 @@ def first_hits(
     for index in range(count):
         origin, direction = row(origins, index), row(directions, index)
         x, y, z = origin[0], origin[1], origin[2]
-        ix, iy, iz = (
-            inverse_component(direction[0]),
-            inverse_component(direction[1]),
-            inverse_component(direction[2]),
-        )
+        ix, iy, iz = (inverse_component(direction[0]), inverse_component(direction[1]), inverse_component(direction[2]))
         best_face, best = -1, max_distance
         root = levels[-1] - 1
         nodes[0], depths[0] = root, levels.shape[0] - 2

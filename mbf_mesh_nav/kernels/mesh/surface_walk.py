@@ -34,11 +34,7 @@ def turned(direction: Vector, normal: Vector, angle: float) -> Vector:
     """Turn a tangent direction left (counter-clockwise seen from above) by ``angle`` [rad]."""
     left = cross(normal, direction)
     c, s = math.cos(angle), math.sin(angle)
-    return (
-        c * direction[0] + s * left[0],
-        c * direction[1] + s * left[1],
-        c * direction[2] + s * left[2],
-    )
+    return (c * direction[0] + s * left[0], c * direction[1] + s * left[1], c * direction[2] + s * left[2])
 
 
 @kernel

@@ -25,12 +25,7 @@ _MAX_TRIES_A_FACE = 50
 
 
 @kernel
-def pass_vertices(
-    mesh: FreeFaces,
-    corridor: IntArray,
-    start: Vector,
-    goal: Vector,
-) -> tuple[FloatArray, IntArray]:
+def pass_vertices(mesh: FreeFaces, corridor: IntArray, start: Vector, goal: Vector) -> tuple[FloatArray, IntArray]:
     """Shortest geodesic that vertices passed on their other side lead to; arguments and result of ``straighten``."""
     points, corridor = straighten(mesh, corridor, start, goal, True)
     length, index, tries = path_length(points), Count(0), _MAX_TRIES_A_FACE * len(corridor)

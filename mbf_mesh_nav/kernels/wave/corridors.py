@@ -104,13 +104,7 @@ def corner_of(corners: IntArray, vertex: int) -> int:
 
 
 @inner_kernel
-def _linked(
-    mesh: FreeFaces,
-    corridor: IntArray,
-    begin: int,
-    count: int,
-    following: int,
-) -> tuple[IntArray, int]:
+def _linked(mesh: FreeFaces, corridor: IntArray, begin: int, count: int, following: int) -> tuple[IntArray, int]:
     """Lead the corridor on to a face: at once, or by the shorter free fan round a common vertex; its length, or -1."""
     last = Count(corridor[count - 1])
     if last == following:
@@ -153,13 +147,7 @@ def next_round(mesh: FreeFaces, vertex: int, face: int, side: int) -> int:
 
 
 @inner_kernel
-def fan_length(
-    mesh: FreeFaces,
-    vertex: int,
-    face: int,
-    following: int,
-    side: int,
-) -> int:
+def fan_length(mesh: FreeFaces, vertex: int, face: int, following: int, side: int) -> int:
     """Steps round a vertex from a face to the following one; -1 if a border or a blocked face lies between.
 
     Also if the faces touch in the vertex only, then the turn comes back to where it began.
@@ -188,11 +176,7 @@ def other_side(mesh: FreeFaces, corridor: IntArray, vertex: int, first: int, las
 
 @kernel
 def straighten(
-    mesh: FreeFaces,
-    corridor: IntArray,
-    start: Vector,
-    goal: Vector,
-    turn: bool,
+    mesh: FreeFaces, corridor: IntArray, start: Vector, goal: Vector, turn: bool
 ) -> tuple[FloatArray, IntArray]:
     """Pull the string through a corridor and turn the corridor round the vertices where that makes the path shorter.
 
@@ -270,14 +254,7 @@ def _angle(at: Vector, first: Vector, second: Vector) -> float:
 
 
 @inner_kernel
-def _free_side(
-    mesh: FreeFaces,
-    corridor: IntArray,
-    points: FloatArray,
-    vertex: int,
-    first: int,
-    last: int,
-) -> int:
+def _free_side(mesh: FreeFaces, corridor: IntArray, points: FloatArray, vertex: int, first: int, last: int) -> int:
     """As ``other_side``; -1 also if the path leaves an angle of half a turn or more there."""
     side = other_side(mesh, corridor, vertex, first, last)
     if side < 0:

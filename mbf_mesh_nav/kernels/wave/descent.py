@@ -37,13 +37,7 @@ class Field(NamedTuple):
 
 @kernel
 def trace_descent(
-    surface: Surface,
-    field: Field,
-    start_face: int,
-    start: Vector,
-    goal_face: int,
-    goal: Vector,
-    along_edges: bool,
+    surface: Surface, field: Field, start_face: int, start: Vector, goal_face: int, goal: Vector, along_edges: bool
 ) -> tuple[FloatArray, IntArray]:
     """Trace the path down from ``start`` to the source of the field at ``goal``.
 
@@ -177,13 +171,7 @@ def _weighted_length(sides: Vector, step: Vector) -> float:
 
 @inner_kernel
 def _way_through(
-    surface: Surface,
-    field: Field,
-    goal_face: int,
-    passed: BoolArray,
-    face: int,
-    place: Vector,
-    over_corner: bool,
+    surface: Surface, field: Field, goal_face: int, passed: BoolArray, face: int, place: Vector, over_corner: bool
 ) -> tuple[float, int, float, int]:
     """Find the shortest continuation from a point of a face: length, side, the share of it, or the corner (else -1).
 

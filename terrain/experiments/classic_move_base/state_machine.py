@@ -29,13 +29,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.executives.conditions import TIME_RESOLUTION
 from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import (
-    ActionResult,
-    ExePathFeedback,
-    ExePathGoal,
-    MoveBaseResult,
-    RecoveryGoal,
-)
+from mbf_abstract.goals.goal_types import ActionResult, ExePathFeedback, ExePathGoal, MoveBaseResult, RecoveryGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome, is_success

@@ -44,10 +44,7 @@ def judge(a: Sequence[Tally], b: Sequence[Tally]) -> list[Criterion]:
             1.3 <= controller.value <= 2.2,
         ),
         Criterion(
-            "recovery total about equal (1.08)",
-            f"{recoveries:.2f}",
-            0.7 <= recoveries <= 1.5,
-            0.8 <= recoveries <= 1.3,
+            "recovery total about equal (1.08)", f"{recoveries:.2f}", 0.7 <= recoveries <= 1.5, 0.8 <= recoveries <= 1.3
         ),
         _judge_mix(a, b),
         Criterion(

@@ -138,12 +138,7 @@ def _schema(topic: str) -> dict[str, str]:
     """Encoding and schema of a topic."""
     schema = TOPICS[topic]
     if isinstance(schema, str):
-        return {
-            "encoding": "json",
-            "schemaName": schema,
-            "schema": json_schema(schema),
-            "schemaEncoding": "jsonschema",
-        }
+        return {"encoding": "json", "schemaName": schema, "schema": json_schema(schema), "schemaEncoding": "jsonschema"}
     files = build_file_descriptor_set(schema).SerializeToString(deterministic=True)
     name: str = schema.DESCRIPTOR.full_name
     return {
