@@ -14,7 +14,7 @@ from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.commands.waiting import waiting
 from mbf_ros.ending import wait_for_ctrl_c
 from mbf_ros.rosbridge_robot.command import connect
-from mbf_ros.serving_options import KEEP_GOALS, MAP_PERIOD
+from mbf_ros.serving_options import KEEP_GOALS, MAP_PERIOD, SENSORS, STAMPED
 
 if TYPE_CHECKING:
     from mbf_abstract.access.page_access import PageAccess
@@ -51,12 +51,8 @@ def serve(
     max_message: int = typer.Option(
         10_000_000, "--max-message", min=1000, help="Longest message of a client, in bytes."
     ),
-    sensor: list[str] = typer.Option(
-        ["/scan:LaserScan=scan", "/points:PointCloud2=points", "/range:Range=range"],
-        "--sensor",
-        help="TOPIC:TYPE=SOURCE of a sensor of the robot, with its source in CONFIG; may be repeated.",
-    ),
-    stamped: bool = typer.Option(False, "--stamped", help="Publish /cmd_vel as TwistStamped."),
+    sensor: list[str] = SENSORS,
+    stamped: bool = STAMPED,
     max_silence: float = typer.Option(
         0.0,
         "--max-silence",

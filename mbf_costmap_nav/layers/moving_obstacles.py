@@ -25,9 +25,9 @@ from mbf_abstract.maps.tracking.moving_obstacles import (
     MovingObstacles,
     MovingObstaclesParameters,
     Sighting,
+    TrackingLayer,
     predicted_places,
 )
-from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, INSCRIBED, LETHAL, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
@@ -42,7 +42,7 @@ class MovingObstaclesLayerParameters(LayerParameters, MovingObstaclesParameters)
     max_obstacle_height: float = parameter(2.0, "Points above this height (map frame) are ignored.", unit="m")
 
 
-class MovingObstaclesLayer(GridLayer):
+class MovingObstaclesLayer(TrackingLayer, GridLayer):
     """Predicted places of tracked objects, and their trails. See the module's text for when to use it."""
 
     Parameters = MovingObstaclesLayerParameters
@@ -57,30 +57,9 @@ class MovingObstaclesLayer(GridLayer):
         self._left: FloatArray = np.zeros((0, 3))  # points of moving objects in the last scan
 
     @property
-    def source_names(self) -> tuple[str, ...]:
-        """Names of the configured sources."""
-        return self.parameters.sources
-
-    @property
     def only_raises(self) -> bool:
         """True: what it frees was marked by sensors."""
         return True
-
-    def insert_scan(self, scan: RangeScan) -> None:
-        """Keep a scan for the next update."""
-        self._objects.insert_scan(scan)
-
-    def stale_reason(self, now: float) -> str:
-        """Name the source that is late at ``now`` [s]."""
-        return self._objects.stale_reason(now, self.parameters.expected_update_rate)
-
-    def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """The objects it follows."""
-        return self._objects.objects(now)
-
-    def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """Also those that were cleared and are not seen again yet."""
-        return self._objects.guarded_objects(now)
 
     def set_footprint(self, footprint: Footprint) -> None:
         """Take over the inscribed radius."""

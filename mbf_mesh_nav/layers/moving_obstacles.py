@@ -26,7 +26,12 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.maps.tracking.moving_obstacles import MovingObstacles, MovingObstaclesParameters, predicted_places
+from mbf_abstract.maps.tracking.moving_obstacles import (
+    MovingObstacles,
+    MovingObstaclesParameters,
+    TrackingLayer,
+    predicted_places,
+)
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import FloatArray, IntArray
@@ -58,7 +63,7 @@ class MovingObstaclesLayerParameters(LayerParameters, MovingObstaclesParameters)
     )
 
 
-class MovingObstaclesLayer(MeshLayer):
+class MovingObstaclesLayer(TrackingLayer, MeshLayer):
     """Predicted places of tracked objects; what an obstacle layer has marked, without their trails."""
 
     Parameters = MovingObstaclesLayerParameters
@@ -73,27 +78,6 @@ class MovingObstaclesLayer(MeshLayer):
         self._predicted: IntArray = NOTHING_CHANGED  # vertices with a prediction
         self._left: IntArray = NOTHING_CHANGED  # vertices below moving objects in the last scan
         self._faces: IntArray = NOTHING_CHANGED  # below the points of the scan that is being taken in
-
-    @property
-    def source_names(self) -> tuple[str, ...]:
-        """Names of the configured sources."""
-        return self.parameters.sources
-
-    def insert_scan(self, scan: RangeScan) -> None:
-        """Keep a scan for the next update."""
-        self._objects.insert_scan(scan)
-
-    def stale_reason(self, now: float) -> str:
-        """Name the source that is late at ``now`` [s]."""
-        return self._objects.stale_reason(now, self.parameters.expected_update_rate)
-
-    def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """The objects it follows."""
-        return self._objects.objects(now)
-
-    def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """Also those that were cleared and are not seen again yet."""
-        return self._objects.guarded_objects(now)
 
     def take_over(self, old: MeshLayer) -> None:
         """Take over the objects with their sensors, and the trails on this part of the surface."""

@@ -14,7 +14,7 @@ from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, 
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from mbf_abstract.commands.waiting import waiting
 from mbf_ros.ending import shown_state
-from mbf_ros.serving_options import KEEP_GOALS, MAP_PERIOD
+from mbf_ros.serving_options import KEEP_GOALS, MAP_PERIOD, MAX_SILENCE, NODE_SENSORS
 
 if TYPE_CHECKING:
     from mbf_ros.ros2.node import NavigationNode
@@ -29,18 +29,9 @@ def register(app: typer.Typer) -> None:
 def ros2(
     context: typer.Context,
     config: Path = typer.Argument(..., metavar="CONFIG", help="A navigation file."),
-    sensor: list[str] = typer.Option(
-        ["scan:LaserScan=scan", "points:PointCloud2=points", "range:Range=range"],
-        "--sensor",
-        help="TOPIC:TYPE=SOURCE of a sensor of the robot, with its source in CONFIG; may be repeated.",
-    ),
+    sensor: list[str] = NODE_SENSORS,
     stamped: bool = typer.Option(False, "--stamped", help="Publish cmd_vel as TwistStamped."),
-    max_silence: float = typer.Option(
-        0.0,
-        "--max-silence",
-        min=0.0,
-        help="Time without odometry, transforms or a sensor at which the robot stops, in s; 0 = command_timeout.",
-    ),
+    max_silence: float = MAX_SILENCE,
     keep_goals: bool = KEEP_GOALS,
     nav2: bool = typer.Option(
         None, "--nav2/--no-nav2", help="Offer Nav2's names, too; if not given, where nav2_msgs is installed."

@@ -10,6 +10,7 @@ from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, 
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_ros.ending import shown_state, wait_for_ctrl_c
 from mbf_ros.rosbridge_robot.options import LinkOptions, RobotOptions, TimeSource
+from mbf_ros.serving_options import MAX_SILENCE, SENSORS, STAMPED
 
 LOOK_PERIOD = 0.1  # s
 
@@ -18,18 +19,9 @@ def connect(
     context: typer.Context,
     address: str = typer.Argument(..., metavar="ADDRESS", help="The robot's rosbridge, e.g. ws://robot:9090."),
     config: Path = typer.Argument(..., metavar="CONFIG", help="A navigation file."),
-    sensor: list[str] = typer.Option(
-        ["/scan:LaserScan=scan", "/points:PointCloud2=points", "/range:Range=range"],
-        "--sensor",
-        help="TOPIC:TYPE=SOURCE of a sensor of the robot, with its source in CONFIG; may be repeated.",
-    ),
-    stamped: bool = typer.Option(False, "--stamped", help="Publish /cmd_vel as TwistStamped."),
-    max_silence: float = typer.Option(
-        0.0,
-        "--max-silence",
-        min=0.0,
-        help="Time without odometry, transforms or a sensor at which the robot stops, in s; 0 = command_timeout.",
-    ),
+    sensor: list[str] = SENSORS,
+    stamped: bool = STAMPED,
+    max_silence: float = MAX_SILENCE,
     cloud_period: float = typer.Option(
         0.1, "--cloud-period", min=0.0, help="Least time between two clouds of a topic, in s."
     ),

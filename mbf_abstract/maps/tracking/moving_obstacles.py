@@ -23,6 +23,7 @@ from pydantic import field_validator
 
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.maps.layers.layer import MapLayer
 from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.contact import ContactParameters
@@ -139,6 +140,34 @@ class MovingObstacles:
             self._tracker.clear(within)
         for watch in self._watches.values():
             watch.cleared()
+
+
+class TrackingLayer(MapLayer):
+    """The part of a moving obstacles layer that is the same on every map: what it asks for, and whom it follows."""
+
+    parameters: MovingObstaclesParameters
+    _objects: MovingObstacles
+
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of the configured sources."""
+        return self.parameters.sources
+
+    def insert_scan(self, scan: RangeScan) -> None:
+        """Keep a scan for the next update."""
+        self._objects.insert_scan(scan)
+
+    def stale_reason(self, now: float) -> str:
+        """Name the source that is late at ``now`` [s]."""
+        return self._objects.stale_reason(now, self.parameters.expected_update_rate)
+
+    def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
+        """The objects it follows."""
+        return self._objects.objects(now)
+
+    def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
+        """Also those that were cleared and are not seen again yet."""
+        return self._objects.guarded_objects(now)
 
 
 def _within(scan: RangeScan, limits: MovingObstaclesParameters) -> RangeScan:
