@@ -113,16 +113,20 @@ class BySpeed(EverySeconds):
         super().begin_turn()
 
 
-class Delay(Decorator):
-    """Wait ``seconds`` before the child is ticked for the first time."""
+class Timed(Decorator):
+    """A node with one child and a number of seconds, which count from when it is entered."""
 
     def __init__(self, name: str, child: Behaviour, seconds: float) -> None:
         super().__init__(name, child)
         self.seconds = seconds
 
     def initialise(self) -> None:
-        """Start the wait."""
+        """Start the time."""
         self._watch = Stopwatch(self.mission.clock)
+
+
+class Delay(Timed):
+    """Wait ``seconds`` before the child is ticked for the first time."""
 
     def wants_tick(self) -> bool:
         """Tick once the wait is over."""
@@ -133,16 +137,8 @@ class Delay(Decorator):
         return self.decorated.status if self.wants_tick() else Status.RUNNING
 
 
-class TimeLimit(Decorator):
+class TimeLimit(Timed):
     """Fail and make the child idle if it has not ended within ``seconds``."""
-
-    def __init__(self, name: str, child: Behaviour, seconds: float) -> None:
-        super().__init__(name, child)
-        self.seconds = seconds
-
-    def initialise(self) -> None:
-        """Start the time."""
-        self._watch = Stopwatch(self.mission.clock)
 
     def update(self) -> Status:
         """Return the child's status while there is time."""

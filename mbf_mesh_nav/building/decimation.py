@@ -108,10 +108,7 @@ def _of_share(vertices: FloatArray, faces: IntArray, whole: SurfaceLocator, shar
         return None
     coarse = SurfaceLocator(build_topology(mesh))
     distances = np.concatenate(
-        [
-            coarse.locate(_places(vertices, faces)).distances,
-            whole.locate(_places(mesh.vertices, mesh.faces)).distances,
-        ]
+        [coarse.locate(_places(vertices, faces)).distances, whole.locate(_places(mesh.vertices, mesh.faces)).distances]
     )
     rms = float(np.sqrt((distances * distances).mean()))
     return DecimatedMesh(mesh.vertices, mesh.faces, float(distances.max()), rms)

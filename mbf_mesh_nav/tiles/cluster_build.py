@@ -32,7 +32,6 @@ class BuildOrder:
         The file as ``open_source`` takes it, under the same absolute path on every machine.
     spacing : float
         Of the samples of a ``.npy`` file [m], else 0.
-    settings : TileSettings
     folder : path
         Of the map, shared by all machines.
     build : str

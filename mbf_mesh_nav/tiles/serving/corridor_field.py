@@ -49,12 +49,7 @@ class _Field:
 
 
 class CorridorField:
-    """What is kept of the last goal; takes one thread at a time, as ``tiled`` does.
-
-    Parameters
-    ----------
-    tiled : TiledMap
-    """
+    """What is kept of the last goal; takes one thread at a time, as ``tiled`` does."""
 
     def __init__(self, tiled: TiledMap) -> None:
         self._tiled = tiled
