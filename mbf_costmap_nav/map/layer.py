@@ -234,7 +234,9 @@ def combine(cells: CellArray, layer_cells: CellArray, box: CellBox, method: Comb
     if method is CombinationMethod.OVERWRITE:
         np.copyto(old, new, where=new != UNKNOWN)
     elif method is CombinationMethod.MAXIMUM:
-        # Unknown is the largest byte, but it gives way to anything known.
-        np.copyto(old, new, where=(new != UNKNOWN) & ((old == UNKNOWN) | (old < new)))
+        # Unknown is the largest byte, but it gives way to anything known: one up, it wraps around to the smallest.
+        old += 1
+        np.maximum(old, new + 1, out=old)
+        old -= 1
     else:
         np.copyto(old, new, where=(new != UNKNOWN) & (old != UNKNOWN) & (old < new))

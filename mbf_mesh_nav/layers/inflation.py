@@ -80,9 +80,10 @@ class InflationLayer(MeshLayer):
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Distances from scratch, costs from distances, lethal as the input."""
         self._drop_all()
-        costs = np.zeros(self.topology.vertex_count, dtype=np.float32)
-        self._repair(np.arange(self.topology.vertex_count, dtype=np.int32), costs)
-        return costs, self.inputs[0].lethal.copy()
+        costs, source = np.zeros(self.topology.vertex_count, dtype=np.float32), self.inputs[0]
+        is_source = source.lethal | (source.costs >= self.parameters.source_cost)
+        self._repair(np.flatnonzero(is_source).astype(np.int32), costs)
+        return costs, source.lethal.copy()
 
     def update_from_inputs(self, changed: IntArray) -> IntArray:
         """Repair the distances around the vertices that became sources or ceased to be, and the costs."""

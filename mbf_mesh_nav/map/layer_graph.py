@@ -108,8 +108,12 @@ class LayerGraph(LayerStack[MeshLayer]):
 
 
 def union_of(sets: Sequence[IntArray]) -> IntArray:
-    """Vertices that are in any of the sets, ascending."""
+    """Vertices that are in any of the sets, each of which is ascending without repetitions, as is the result."""
     filled = [changed for changed in sets if len(changed)]
-    if not filled:
-        return NOTHING_CHANGED
-    return filled[0] if len(filled) == 1 else np.unique(np.concatenate(filled))
+    if len(filled) < 2:
+        return filled[0] if filled else NOTHING_CHANGED
+    merged = np.sort(np.concatenate(filled))  # np.unique hashes, which takes ten times as long
+    is_new = np.empty(len(merged), dtype=np.bool_)
+    is_new[0] = True
+    np.not_equal(merged[1:], merged[:-1], out=is_new[1:])
+    return merged[is_new]

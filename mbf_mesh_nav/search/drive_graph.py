@@ -61,7 +61,10 @@ class DriveGraph:
         order = np.argsort(self.moves.ends, kind="stable").astype(np.int32)
         counts = np.bincount(self.moves.ends, minlength=self._mesh.vertex_count)
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-        return Arrivals(offsets, self._starts[order].astype(np.int32), order)
+        origins = self._starts[order].astype(np.int32)
+        for array in (offsets, origins):  # read-only as a mesh's own: kernels of searches are compiled for one kind
+            array.setflags(write=False)
+        return Arrivals(offsets, origins, order)
 
     @property
     def is_edge(self) -> BoolArray:

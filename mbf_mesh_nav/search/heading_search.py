@@ -147,6 +147,7 @@ class HeadingSearch:
         mesh_map, ends, arrivals = self._mesh_map, self._ends(query), self.graph.arrivals
         limited = limits.allowed, limits.roll, costs.roll, limits.known, FORBIDDEN
         backwards = weights_of_arrivals(arrivals, self.graph.moves.headings, task.weights, *limited)
+        backwards.setflags(write=False)  # as the weights of a snapshot are
         distances = np.full(len(mesh_map.vertices), np.inf, dtype=np.float32)
         corners, rests, _ = task.goal
         np.minimum.at(distances, corners, rests)

@@ -22,37 +22,35 @@ STACK_SIZE = 128
 
 def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """Boxes (N, 6) as min x y z, max x y z, leaves first, and the start of every level (levels + 1,)."""
+    sizes = [-(-len(faces) // BRANCHES)]
+    while sizes[-1] > 1:
+        sizes.append(-(-sizes[-1] // BRANCHES))
+    levels = np.cumsum([0, *sizes], dtype=np.int32)
+    boxes = np.empty((levels[-1], 6), dtype=np.float64)
     # Boxes are slightly larger than their faces, so that rounding loses no ray that runs along the side of one.
     margin = 1e-12 * float(np.abs(vertices).max(initial=0.0))
-    levels = [_joined(_face_boxes(vertices, faces, margin))]
-    while len(levels[-1]) > 1:
-        levels.append(_joined(levels[-1]))
-    return np.concatenate(levels), np.cumsum([0, *map(len, levels)], dtype=np.int32)
+    _fill_boxes(vertices, faces, margin, levels, boxes)
+    return boxes, levels
 
 
 @kernel
-def _face_boxes(vertices: FloatArray, faces: IntArray, margin: float) -> FloatArray:
-    """Box (F, 6) of every face, larger by ``margin`` [m] on all sides."""
-    boxes = np.empty((len(faces), 6), dtype=np.float64)
+def _fill_boxes(vertices: FloatArray, faces: IntArray, margin: float, levels: IntArray, boxes: FloatArray) -> None:
+    """Write the box of every ``BRANCHES`` faces, larger by ``margin`` [m] on all sides, then those around boxes."""
     for face in range(len(faces)):
         a, b, c = triangle(vertices, faces, Index(face))
+        leaf, is_first = face // BRANCHES, face % BRANCHES == 0
         for axis in range(3):
-            boxes[face, axis] = min(a[axis], b[axis], c[axis]) - margin
-            boxes[face, axis + 3] = max(a[axis], b[axis], c[axis]) + margin
-    return boxes
-
-
-@kernel
-def _joined(boxes: FloatArray) -> FloatArray:
-    """Boxes (ceil(n / BRANCHES), 6), each around the next ``BRANCHES`` of the given (n, 6)."""
-    joined = np.empty(((len(boxes) + BRANCHES - 1) // BRANCHES, 6), dtype=np.float64)
-    for child in range(len(boxes)):
-        node = child // BRANCHES
-        for axis in range(6):
-            inner = boxes[child, axis]
-            if child % BRANCHES == 0 or (inner < joined[node, axis] if axis < 3 else inner > joined[node, axis]):
-                joined[node, axis] = inner
-    return joined
+            least, most = min(a[axis], b[axis], c[axis]) - margin, max(a[axis], b[axis], c[axis]) + margin
+            boxes[leaf, axis] = least if is_first else min(boxes[leaf, axis], least)
+            boxes[leaf, axis + 3] = most if is_first else max(boxes[leaf, axis + 3], most)
+    for level in range(1, len(levels) - 1):
+        below = levels[level - 1]
+        for child in range(levels[level] - below):
+            node, is_first = levels[level] + child // BRANCHES, child % BRANCHES == 0
+            for axis in range(3):
+                least, most = boxes[below + child, axis], boxes[below + child, axis + 3]
+                boxes[node, axis] = least if is_first else min(boxes[node, axis], least)
+                boxes[node, axis + 3] = most if is_first else max(boxes[node, axis + 3], most)
 
 
 @inner_kernel

@@ -144,7 +144,9 @@ def search_with_heading(
             following = neighbour * HEADINGS + new_heading
             if candidate < distances[following]:
                 if find_out and known[slot] == UNKNOWN:
-                    known[slot] = _may_drive(surface, chassis, scratch, vertex, neighbour, moves.shares[slot])
+                    known[slot] = _may_drive(
+                        surface, chassis, scratch, Count(vertex), Count(neighbour), moves.shares[slot]
+                    )
                 if known[slot] == FORBIDDEN:
                     continue
                 distances[following] = candidate
@@ -169,7 +171,7 @@ def find_out_along(
         while moves.ends[slot] != following:
             slot += 1
         if known[slot] == UNKNOWN:
-            known[slot] = _may_drive(surface, chassis, scratch, vertex, following, moves.shares[slot])
+            known[slot] = _may_drive(surface, chassis, scratch, Count(vertex), Count(following), moves.shares[slot])
         drivable = drivable and known[slot] == DRIVABLE
     return drivable
 
@@ -178,9 +180,9 @@ def find_out_along(
 def _may_drive(surface: Surface, chassis: Chassis, scratch: Scratch, vertex: int, end: int, share: float) -> int:
     """``DRIVABLE`` or ``FORBIDDEN``, for the move from a vertex to another."""
     if np.isnan(share):
-        use = edge_use(surface, chassis, scratch, Count(vertex), Count(end))
+        use = edge_use(surface, chassis, scratch, vertex, end)
     else:
-        use = stride_use(surface, chassis, scratch, Count(vertex), Count(end), share)
+        use = stride_use(surface, chassis, scratch, vertex, end, share)
     return DRIVABLE if use <= 1.0 else FORBIDDEN
 
 

@@ -7,13 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from mbf_costmap_nav.grid.costmap import GridGeometry
+from mbf_costmap_nav.grid.costmap import CellBox, GridGeometry
 from mbf_costmap_nav.kernels.map.inflation import inflate
 from mbf_costmap_nav.kernels.map.rasterisation import blocked_under, fill_polygon, polygon_costs, rasterise_polygon
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays, mark_points
 from mbf_costmap_nav.kernels.map.voxel import clear_voxel_rays, count_bits, project_columns
 from mbf_costmap_nav.layers.denoise import small_groups
 from mbf_costmap_nav.layers.inflation import cost_table
+from mbf_costmap_nav.map.layer import CombinationMethod, combine
 
 SIXTEENTHS = st.integers(-32, 144).map(lambda value: value / 16)
 CELL_VALUES = st.sampled_from([0, 0, 0, 0, 0, 0, 100, 253, 254, 255])
@@ -230,3 +231,12 @@ def test_columns_become_lethal_free_or_unknown_by_their_thresholds():
     cells = np.full((1, 4), 9, dtype=np.uint8)
     project_columns(marked, seen, 4, 1, 2, 255, cells, (0, 0, 4, 1))
     assert cells.tolist() == [[254, 0, 255, 255]]
+
+
+def test_the_maximum_of_two_layers_gives_way_to_whatever_is_known():
+    cells, layer = np.meshgrid(np.arange(256, dtype=np.uint8), np.arange(256, dtype=np.uint8))
+    combined = cells.copy()
+    combine(combined, layer, CellBox(0, 0, 256, 256), CombinationMethod.MAXIMUM)
+    for (old, new), result in zip(np.stack([cells, layer], axis=-1).reshape(-1, 2), combined.ravel(), strict=True):
+        known = [value for value in (old, new) if value != 255]
+        assert result == max(known, default=255)

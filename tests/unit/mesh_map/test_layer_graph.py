@@ -11,7 +11,7 @@ from mbf_mesh_nav.layers.combinations.max_combination import MaxCombinationLayer
 from mbf_mesh_nav.layers.combinations.mean import MeanLayer
 from mbf_mesh_nav.layers.combinations.weighted_sum import WeightedSumLayer
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerContext, LayerParameters, MeshLayer
-from mbf_mesh_nav.map.layer_graph import LayerGraph
+from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
 MESH = MeshMap.from_heights(np.zeros((4, 5)), 1.0, 1.0)
@@ -278,3 +278,9 @@ def test_values_of_a_layer_cannot_be_written_from_outside():
         layer.costs[0] = 1.0
     with pytest.raises(ValueError, match="read-only"):
         layer.lethal[0] = True
+
+
+@pytest.mark.parametrize("sets", [[], [[]], [[3, 5]], [[1, 4], [], [2, 4]], [[7], [7], [0, 7, 9]]])
+def test_the_union_of_changes_names_each_vertex_once_and_in_order(sets):
+    union = union_of([np.array(vertices, dtype=np.int32) for vertices in sets])
+    assert union.dtype == np.int32 and union.tolist() == sorted(set().union(*sets))
