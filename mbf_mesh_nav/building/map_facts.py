@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
 from mbf_mesh_nav.building.decimation import DecimatedMesh
 from mbf_mesh_nav.building.surface import BuiltSurface
@@ -39,8 +41,7 @@ class MapFacts:
     error_rms, error_95, error_max : float
         Of the surface against its points, the noise of the points included; 95 % are closer than ``error_95``.
     height_error : float
-        Standard error of a vertex, whose height is the mean of the points of a cell: their error over the square root
-        of their number, less what smoothing takes off it; with what decimation adds.
+        Standard error of a vertex among its neighbours, see ``error_of_heights``; with what decimation adds.
     faces_before : int
         Before decimation.
     decimation_max : float
@@ -112,9 +113,35 @@ def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
         error_rms=rms,
         error_95=float(np.percentile(distances, 95.0)) if len(distances) else 0.0,
         error_max=float(distances.max(initial=0.0)),
-        height_error=surface.kept_error * rms / max(points_of_cell, 1.0) ** 0.5,
+        height_error=error_of_heights(distances, counts, surface.kept_error),
         faces_before=len(surface.faces),
     )
+
+
+def error_of_heights(distances: FloatArray, counts: NDArray[np.int64], kept_error: float) -> float:
+    """Standard error [m] of a vertex, whose height is the mean of the points of a cell.
+
+    The points are nearer to faces that were made of them than to the ground: each cell takes one of their degrees of
+    freedom, less if it was smoothed. A cell's variance is that of a point over their number, on average over the cells,
+    many of which have fewer points than usual; where heights are smoothed, those lean on their neighbours. Errors that
+    all points of a place have in common, as of scans from a drifting pose, lift it as a whole; they are not in it.
+
+    Parameters
+    ----------
+    distances : (n,) float64
+        Of the points from the faces [m].
+    counts : (c,) int64
+        Points of each cell.
+    kept_error : float
+        Share of a cell's error that smoothing lets through.
+    """
+    if not len(distances) or not len(counts):
+        return 0.0
+    free = max(len(distances) - kept_error * len(counts), 1.0)
+    variance = float((distances * distances).sum()) / free
+    several = np.maximum(counts, 1)
+    of_cell = float((1.0 / several).mean()) if kept_error == 1.0 else 1.0 / float(np.median(several))
+    return kept_error * math.sqrt(variance * of_cell)
 
 
 def lines_of(facts: MapFacts) -> list[tuple[str, str]]:
@@ -135,7 +162,10 @@ def lines_of(facts: MapFacts) -> list[tuple[str, str]]:
         ("obstacles", f"{facts.obstacle_area:.1f} m2"),
         ("left out", thrown),
         ("error", f"{facts.error_rms:.4f} m rms of the points, 95 % below {facts.error_95:.4f} m"),
-        ("heights", f"{facts.height_error:.4f} m standard error, by which layers narrow their limits"),
+        (
+            "heights",
+            f"{facts.height_error:.4f} m standard error among neighbours, by which layers narrow their limits",
+        ),
         ("origin", f"({origin}) of the files is (0, 0, 0) of the map"),
         ("crs", facts.crs or "unknown"),
     ]

@@ -23,6 +23,19 @@ def ground(rng, height, size=(16.0, 12.0), noise=NOISE):
     return np.column_stack([xy, z])
 
 
+def from_wrong_poses(rng, points, error=0.05, reach=4.0, drifting=20.0):
+    """Points as overlapping scans a metre apart have them, whose places are wrong; half of it drifts."""
+    low = points[:, :2].min(axis=0)
+    columns, rows = np.ceil(np.ptp(points[:, :2], axis=0)).astype(int) + 1
+    drift, kept = rng.normal(size=(columns * rows, 3)), np.exp(-1.0 / drifting)
+    for scan in range(1, columns * rows):
+        drift[scan] = kept * drift[scan - 1] + np.sqrt(1.0 - kept * kept) * drift[scan]
+    errors = error * np.sqrt(0.5) * (drift + rng.normal(size=drift.shape))
+    seen_from = points[:, :2] - low + rng.uniform(-reach, reach, (len(points), 2))
+    column, row = np.clip(np.rint(seen_from), 0, (columns - 1, rows - 1)).astype(int).T
+    return points + errors[row * columns + np.where(row % 2 == 0, column, columns - 1 - column)]
+
+
 def post(rng, x, y, foot, diameter=0.1, height=1.0):
     """Points on the side of a post."""
     count = max(20, int(DENSITY * np.pi * diameter * height))
