@@ -186,6 +186,8 @@ class Recording:
         """Read a file written by ``save``, of at most ``max_bytes`` in memory; raises RecordingError."""
         try:
             return _recording_from(read_arrays(Path(file), max_bytes))
+        except FileNotFoundError as error:
+            raise RecordingError(f"{file}: expected the recording of a run, got no such file") from error
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise RecordingError(f"{file}: is no readable recording: {type(error).__name__}: {error}") from error
 

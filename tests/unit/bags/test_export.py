@@ -145,7 +145,7 @@ def test_the_command_exports_the_recording_of_a_run(tmp_path):
 
 def test_folders_without_one_recording_are_refused(tmp_path):
     result = CliRunner().invoke(make_app(), ["bag", "export", str(tmp_path)])
-    assert result.exit_code == 2 and "is no readable recording" in result.output
+    assert result.exit_code == 2 and "expected the recording of a run, got no such file" in result.output
     for name in ("ann", "bob"):
         (tmp_path / name).mkdir()
         recording_of(make_log(0)).save(tmp_path / name / "recording.npz")
