@@ -150,7 +150,7 @@ class _Grip:
         if problem:
             return Twist(), problem
         try:
-            pose, velocity = robot.pose(), robot.velocity()
+            pose, velocity = robot.pose(), self._runtime.velocity_or_command(robot.measured_velocity())
             command, obstacle = self._before_obstacles(pose)
         except (RobotStateError, TransformError) as error:
             return Twist(), str(error)

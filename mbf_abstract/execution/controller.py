@@ -137,7 +137,7 @@ class ControllerExecution:
         end = self._watch_motion(pose, measured)
         if end is not None:
             return end
-        result = self._compute(pose, velocity)
+        result = self._compute(pose, measured)
         end = self._judge(result, lease)
         self._on_cycle(pose, result)
         return end
@@ -233,9 +233,9 @@ class ControllerExecution:
             return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, text)
         return None
 
-    def _compute(self, pose: Pose, velocity: Twist) -> ControlResult:
+    def _compute(self, pose: Pose, measured: Twist | None) -> ControlResult:
         self._enter(ControllerState.CONTROLLING)
-        request = ControlRequest(pose, velocity, self._run.handle.cancel_token)
+        request = ControlRequest(pose, measured or Twist(), self._run.handle.cancel_token)
         compute = partial(self._controller.compute_velocity_commands, request)
         try:
             result = self._run.ask("compute_velocity_commands", compute, ControlResult)
@@ -244,7 +244,7 @@ class ControllerExecution:
         if result.success and result.command is None:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, "success, but no command")
         if result.success:
-            result = self._avoid_contact(pose, velocity, result)
+            result = self._avoid_contact(pose, self._runtime.velocity_or_command(measured), result)
         self.last_result = result
         self._cycles += 1
         self._failed_cycles += not result.success

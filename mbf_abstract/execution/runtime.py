@@ -13,7 +13,7 @@ from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.drive.velocity_gate import VelocityGate
 from mbf_abstract.events import EventBus
 from mbf_abstract.execution.supervisor import Supervisor
-from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.callbacks import CallbackThread
 from mbf_abstract.maps.relaxation import Relaxation
@@ -69,3 +69,10 @@ class Runtime:
     """Goal ids, unique in this server."""
     hanging: set[object] = field(default_factory=set)
     """What runs on although its goal has ended: a call that does not come back; capped by ``max_quarantined``."""
+
+    def velocity_or_command(self, measured: Twist | None) -> Twist:
+        """How the robot moves: as measured, and without odometry as it was last told to, straight on for a car."""
+        if measured is not None:
+            return measured
+        command = self.gate.last_command
+        return Twist.planar(command.speed) if isinstance(command, AckermannCommand) else command

@@ -42,6 +42,8 @@ class MissionContext:
         Newest feedback of driving along ``path``.
     failure : ActionResult, optional
         The last failure of planning, driving, a check or a watchdog; recoveries are picked by its code.
+    detour_asked : tuple of Pose and float, optional
+        Where a way around was asked for last, and until when [s] it is not asked for again there.
     stuck : StuckMonitor
         The trouble so far: whether the same failure comes again and again at one place.
     """
@@ -53,6 +55,7 @@ class MissionContext:
     drive: ExePathResult | None = None
     feedback: ExePathFeedback | None = None
     failure: ActionResult | None = None
+    detour_asked: tuple[Pose, float] | None = None
     stuck: StuckMonitor = field(init=False, repr=False)
     _handles: list[AnyGoalHandle] = field(default_factory=list, repr=False)
 
@@ -78,7 +81,7 @@ class MissionContext:
     def begin(self, target: Pose) -> None:
         """Forget everything about the old target and go to another one."""
         self.target, self.path, self.plan, self.drive = target, None, None, None
-        self.feedback, self.failure = None, None
+        self.feedback, self.failure, self.detour_asked = None, None, None
         self.stuck.restart()
 
     def fail(self, failure: ActionResult) -> None:

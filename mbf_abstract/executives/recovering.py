@@ -204,24 +204,36 @@ class PickByMotion(Composite):
         Where no tracked object is in the way.
     length : float
         How far ahead along the path [m] counts.
+    standing : float
+        What stands for less than this [s] counts as moving: it may have been seen for too short a time to know.
     """
 
     children_remember = True
 
     def __init__(
-        self, name: str, by_motion: Mapping[Motion, Behaviour], nobody: Behaviour, length: float = 3.0
+        self,
+        name: str,
+        by_motion: Mapping[Motion, Behaviour],
+        nobody: Behaviour,
+        length: float = 3.0,
+        standing: float = 0.0,
     ) -> None:
         super().__init__(name, list(dict.fromkeys([*by_motion.values(), nobody])))
         self.by_motion = dict(by_motion)
         self.nobody = nobody
         self.length = length
+        self.standing = standing
         self._picked: Behaviour | None = None
 
     def initialise(self) -> None:
         """Ask the map when entered; where it cannot say, nobody is in the way."""
         first = self._first_in_the_way()
-        self._picked = self.nobody if first is None else self.by_motion.get(first.by.motion)
-        self.feedback_message = "nobody" if first is None else f"{first.by.motion.value}, {first.distance:.1f} m ahead"
+        if first is None:
+            self._picked, self.feedback_message = self.nobody, "nobody"
+            return
+        motion = first.by.motion if first.by.standing >= self.standing else Motion.MOVING
+        self._picked = self.by_motion.get(motion)
+        self.feedback_message = f"{motion.value}, {first.distance:.1f} m ahead"
 
     def _first_in_the_way(self) -> Blockage | None:
         if self.mission.path is None:

@@ -20,10 +20,12 @@ from py_trees.behaviours import Success
 from py_trees.common import ParallelPolicy
 from py_trees.composites import Parallel, Sequence
 
-from mbf_abstract.executives.conditions import BEYOND_RECOVERY, recovery_would_help
+from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.executives.conditions import BEYOND_RECOVERY, Do, recovery_would_help
 from mbf_abstract.executives.escalation import Escalation
-from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery, UpdatePath
+from mbf_abstract.executives.leaves import Detour, ExePath, GetPath, Recovery, UpdatePath
 from mbf_abstract.executives.map_leaves import CheckPose, PathBlocked
+from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.executives.pacing import Delay, InBackground
 from mbf_abstract.executives.recovering import (
     InOrder,
@@ -42,6 +44,12 @@ BLOCKED = (ExePathOutcome.BLOCKED_PATH, ExePathOutcome.BLOCKED_GOAL, ExePathOutc
 OFF_THE_PATH = (ExePathOutcome.MISSED_PATH, ExePathOutcome.MISSED_GOAL)
 IN_CONTACT = (ExePathOutcome.COLLISION, ExePathOutcome.ROBOT_STUCK)
 SECOND_PLANNER_SLOT = 1
+LOOK_PERIOD = 1.0
+"""Time [s] between two looks at the path of a tree that asks who is on it."""
+STANDING = 1.5
+"""Who has been seen to stand for less than this [s] may be about to move."""
+CREEPING = 0.2
+"""A robot slower than this [m/s] before somebody who stands is taken to be waited for."""
 
 
 @dataclass(frozen=True)
@@ -60,13 +68,15 @@ class TreeOptions:
     clear, out_of_collision, relax_planner, relax_controller, move_away : str
         Recovery behaviours by what they are for; empty = none.
     wait, give_way : str
-        Where a tracked object blocks the path: ``wait`` for one that moves, and no second planner; for one that
-        stands ``wait``, then a plan around it, then ``give_way``; one that is parked is planned around at once.
-        Empty, the default: nobody asks.
+        Where a tracked object blocks the path: ``wait`` for one that moves, and no second planner; around one that
+        stands while this robot stands or creeps, as it may wait for this one, a plan, which is taken where it is no
+        more than ``longest_update`` or a few metres longer; then ``wait`` twice, then ``give_way``; one that is parked
+        is planned around at once. Empty, the default: nobody asks.
     check_poses : bool
         Whether navigation first looks whether robot and goal stand free.
     second_planner_pause : float
-        Pause of the second planner between two of its plans [s]; 0 = no second planner.
+        Pause of the second planner between two of its plans [s]; 0 = no second planner. With ``wait`` it looks at the
+        path every second, and the pause is that after a path around somebody that was too long to be taken.
     second_planner_look_ahead : float
         The second planner plans only where the path is blocked within this length [m] ahead; 0 = in any case.
     longest_update : float
@@ -151,9 +161,10 @@ def _drive(options: TreeOptions) -> Behaviour:
     follow = ExePath("follow path", options.controller)
     drive: Behaviour = follow
     if options.second_planner_pause > 0.0:
-        second = _second_planner(options)
-        pause = f"every {options.second_planner_pause:g} s"
-        background = InBackground("in the background", Delay(pause, second, options.second_planner_pause))
+        looks = bool(options.wait) and options.second_planner_look_ahead > 0.0
+        pause = LOOK_PERIOD if looks else options.second_planner_pause
+        second = Delay(f"every {pause:g} s", _second_planner(options), pause)
+        background = InBackground("in the background", second)
         policy = ParallelPolicy.SuccessOnSelected(children=[follow], synchronise=False)
         drive = Parallel("drive and update", policy, [follow, background])
     if options.progress_timeout > 0.0:
@@ -170,15 +181,29 @@ def _second_planner(options: TreeOptions) -> Behaviour:
     update = UpdatePath("update path", planner, SECOND_PLANNER_SLOT, options.longest_update, options.refiner)
     if options.second_planner_look_ahead <= 0.0:
         return update
+    if options.wait:  # what moves is waited for: a path around where it is now would lead through where it goes
+        around = _detour("update path", options, planner, SECOND_PLANNER_SLOT)
+        passing = _detour("pass it", options, planner, SECOND_PLANNER_SLOT)
+        if_it_waits_for_us = Sequence(
+            "both stand", memory=True, children=[Do("robot stands?", _nearly_stands), passing]
+        )
+        for_standing: dict[Motion, Behaviour] = {Motion.WAITING: if_it_waits_for_us, Motion.PARKED: around}
+        update = PickByMotion("who blocks it?", for_standing, nobody=around, standing=STANDING)
     blocked = PathBlocked("path blocked?", options.second_planner_look_ahead)
-    return Sequence("update a blocked path", memory=True, children=[blocked, _unless_it_moves(options, update)])
+    return Sequence("update a blocked path", memory=True, children=[blocked, update])
 
 
-def _unless_it_moves(options: TreeOptions, update: Behaviour) -> Behaviour:
-    """What moves is waited for: a path around where it is now would lead through where it goes."""
-    if not options.wait:
-        return update
-    return PickByMotion("who blocks it?", dict.fromkeys((Motion.WAITING, Motion.PARKED), update), nobody=update)
+def _nearly_stands(mission: MissionContext) -> bool:
+    """Whether the robot is as slow as one that creeps up to what it cannot pass."""
+    try:
+        return mission.navigator.server.runtime.robot.velocity().speed < CREEPING
+    except RobotStateError:
+        return False
+
+
+def _detour(name: str, options: TreeOptions, planner: str, slot: int = 0) -> Behaviour:
+    pause = options.second_planner_pause or TreeOptions.second_planner_pause
+    return Detour(name, planner, slot, options.longest_update, options.refiner, pause)
 
 
 def _recovery(options: TreeOptions) -> Behaviour:
@@ -201,14 +226,16 @@ def _unblock(options: TreeOptions) -> Behaviour:
     usual = _in_turn("unblock", o.clear, o.relax_controller, o.out_of_collision)
     if not (o.wait and o.give_way):
         return usual
-    around = UpdatePath("plan around it", o.planner, longest=o.longest_update, refiner=o.refiner)
+    patient: list[Behaviour] = [Recovery(o.wait, "wait"), Recovery(o.wait, "wait on"), Recovery(o.give_way)]
+    if o.reuse_path:
+        patient.insert(0, _detour("plan around it", o, o.planner))
     by_motion: dict[Motion, Behaviour] = {
         Motion.MOVING: Recovery(o.wait),
-        Motion.WAITING: RoundRobin("yield", [Recovery(o.wait), around, Recovery(o.give_way)]),
+        Motion.WAITING: RoundRobin("yield", patient),
     }
     if not o.reuse_path:  # every recovery that succeeds is followed by a plan; otherwise one that fails is
         by_motion[Motion.PARKED] = Success("plan around it at once")
-    return PickByMotion("who is in the way?", by_motion, nobody=usual)
+    return PickByMotion("who is in the way?", by_motion, nobody=usual, standing=STANDING)
 
 
 def _in_turn(name: str, *behaviors: str) -> RoundRobin:

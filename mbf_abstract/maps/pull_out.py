@@ -14,7 +14,7 @@ around the outline and for a place ``AT_EASE`` farther from the paths than it mu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.manoeuvres import PlanarPose, Step, find_manoeuvre
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.traffic.right_of_way import STOREY
 
 PATH_SPACING = 0.1  # m
@@ -31,6 +32,7 @@ ROOM = 0.05  # m
 AT_EASE, SHORT = 0.1, 0.05  # m
 LEAVING = 0.3  # m around a robot that touches something, or nearly does
 NEAREST_WITHIN = 2.0  # m
+MEETING = 3.0  # m; who is farther away is not whom the robot makes room for
 
 
 def find_pull_out(
@@ -132,6 +134,38 @@ def paths_to_keep_free(begin: Pose, track: FloatArray, paths: Sequence[FloatArra
     back = behind[-1] - older[-1] if len(older) else np.array([-1.0, 0.0])
     others = [_on_storey(begin, path) for path in paths]
     return np.concatenate([on * (1.0, 0.0), behind, behind[-1] + on * back / norm(back), *others])
+
+
+def paths_beside(
+    start: Pose, own: FloatArray, known: Iterable[TrackedObject], distance: float, same_storey: float
+) -> Iterator[FloatArray]:
+    """Yield what to keep free, the best first: with the ways of who is tracked near the own path, then without.
+
+    Who blocks the robot is taken to go parallel to the robot's path, through where it is now; on the path alone the
+    robot would stand beside its own way and in front of the other one.
+
+    Parameters
+    ----------
+    start : Pose
+        Of the robot, in the frame of the objects.
+    own : (n, 2) float64
+        Of ``paths_to_keep_free`` [m].
+    known : iterable of TrackedObject
+    distance : float
+        Who is nearer to the own path than twice this [m], and less than ``MEETING`` ahead, counts; who is parked does
+        not.
+    same_storey : float
+        Who is farther above or below [m] does not count.
+    """
+    beside = []
+    for one in known:
+        x, y, z = rotated_back(start.rotation, np.subtract((one.x, one.y, one.z), start.position)).tolist()
+        near = math.hypot(x, y) < MEETING and float(norm(own - (x, y)).min()) < 2.0 * distance
+        if near and abs(z) < same_storey and one.motion is not Motion.PARKED:
+            beside.append(own + np.array([0.0, y]))
+    if beside:
+        yield np.concatenate([own, *beside])
+    yield own
 
 
 def _on_storey(begin: Pose, points: FloatArray) -> FloatArray:

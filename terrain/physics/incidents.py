@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.tilt import tilt_of
 from terrain.physics.encounters import Mover, NearMisses, touched_other
 from terrain.physics.motion_sample import MotionSample, Other, Thing
@@ -150,6 +150,8 @@ class IncidentMonitor:
     _last: MotionSample | None = None
     _anchor: Pose | None = None
     _moved_in_contact: bool = False
+    _pushed: bool = False
+    _rolls_by_itself: bool = False
 
     def __post_init__(self) -> None:
         self._near_misses = NearMisses(self.limits.near_miss_gap)
@@ -205,15 +207,21 @@ class IncidentMonitor:
     def _moves(self, sample: MotionSample) -> bool:
         """Whether the robot moves by itself: by its command, or by its wheels before a contact.
 
-        What turns its wheels in a contact may be what pushes it, so only its command counts then.
+        What turns its wheels in a contact may be what pushes it, so only its command counts then, and afterwards until
+        they have come to rest.
         """
-        limits, before = self.limits, self._last
-        motions = [sample.commanded]
-        if not sample.touched:
-            motions.append(sample.rolling)
-        if before is not None and not before.touched:
-            motions.append(before.rolling)
-        return not all(motion.is_stopped(limits.standing_speed, limits.standing_yaw_rate) for motion in motions)
+        by_command, rolls = not self._stands(sample.commanded), not self._stands(sample.rolling)
+        moves = by_command or self._rolls_by_itself
+        if sample.touched:
+            self._pushed = not (moves or self._moved_in_contact)
+            self._rolls_by_itself = False
+            return moves
+        self._pushed = self._pushed and rolls and not by_command
+        self._rolls_by_itself = rolls and not self._pushed
+        return moves or self._rolls_by_itself
+
+    def _stands(self, motion: Twist) -> bool:
+        return motion.is_stopped(self.limits.standing_speed, self.limits.standing_yaw_rate)
 
     def _begins(self, kind: IncidentKind, hold: float, holds: bool, now: float) -> bool:
         """Whether ``kind`` has held long enough and was not counted yet."""

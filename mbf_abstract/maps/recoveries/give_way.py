@@ -6,10 +6,12 @@ seeds: both may give way at first, the waits they draw let one go on before the 
 
 Its path is the track that the robot has driven, straight ahead and straight on behind the track. The nearest place is
 searched where the base stands ``distance`` from all of it, by the shortest manoeuvre on which the outline touches
-nothing the map knows: back into a bay, around a corner, or a step aside in a hall; see ``maps.pull_out``. It is driven
-slowly, each command checked as in every recovery. Where a command is refused, the robot waits for ``PAUSE``, in which
-somebody who moves there stops or passes, and searches anew, ``ATTEMPTS`` times in all; afterwards it stands for a time
-that is drawn anew for each run. Where there is no such place it ends with IMPASSABLE at once.
+nothing the map knows: back into a bay, around a corner, or a step aside in a hall; see ``maps.pull_out``. Who is
+tracked near its path is taken to go beside it, and that way is kept free, too, where there is such a place. The
+manoeuvre is driven slowly, each command checked as in every recovery. Where a command is refused, the robot waits for
+``PAUSE``, in which somebody who moves there stops or passes, and searches anew, ``ATTEMPTS`` times in all; afterwards
+it stands for a time that is drawn anew for each run, or until those who were tracked on its way have left it. Where
+there is no such place it ends with IMPASSABLE at once.
 
 Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
 goes first waits until the others have left its path; the others pull out, also off the path that the first one has
@@ -39,8 +41,9 @@ from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
 from mbf_abstract.maps.manoeuvres import PlanarPose, Step
-from mbf_abstract.maps.pull_out import find_pull_out, paths_to_keep_free
+from mbf_abstract.maps.pull_out import find_pull_out, paths_beside, paths_to_keep_free
 from mbf_abstract.maps.recoveries.wait import stand
+from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
@@ -51,6 +54,7 @@ LOOKAHEAD = 0.25  # m to the point of the manoeuvre that is steered to
 ATTEMPTS, PAUSE = 4, 2.0  # to drive to a place; s between two of them
 WAIT_PERIOD = 0.5  # s between two looks at where the other robots are
 MOVED = 0.2  # m, of another robot that does not stand
+WAY_ON = 2.0  # m of its way on that must be clear of others before it ends its wait early
 MOST_WAITS = 3.0  # times longest_wait, for robots that move again and again
 END_REACHED, HEADING_REACHED = 0.04, 0.05  # m, rad
 NOT_THERE = frozenset([RecoveryOutcome.IMPASSABLE, RecoveryOutcome.PAT_EXCEEDED])
@@ -107,10 +111,11 @@ class GiveWayRecovery(GuardedRecovery):
                 self.traffic.wait_was_in_vain(rivals)
         before = self._before(rivals)
         self.traffic.yields = True
+        begin = request.motion.pose()
         try:
             result = self._pull_out(request)
             if result.success:
-                return self._stand_aside(request, before)
+                return self._stand_aside(request, begin, before)
         finally:
             self.traffic.yields = False
         return self._without_room(request, before, result) if result.outcome in NOT_THERE else result
@@ -142,13 +147,40 @@ class GiveWayRecovery(GuardedRecovery):
                 break
         return result
 
-    def _stand_aside(self, request: RecoveryRequest, before: list[Announcement]) -> RecoveryResult:
+    def _stand_aside(self, request: RecoveryRequest, begin: Pose, before: list[Announcement]) -> RecoveryResult:
         """Wait beside the path, until the robots that go first have passed."""
         p, place = self.parameters, request.motion.pose()
         if before:
             return self._wait_for(request, before, f"has pulled out at ({place.x:.2f}, {place.y:.2f}) for")
-        result = stand(request, p.wait + p.random_extra * float(self.rng.random()))
+        result = self._stand_until_clear(request, begin, p.wait + p.random_extra * float(self.rng.random()))
         return replace(result, message=f"{result.message} at ({place.x:.2f}, {place.y:.2f}), beside its path")
+
+    def _stand_until_clear(self, request: RecoveryRequest, begin: Pose, duration: float) -> RecoveryResult:
+        """Stand for a time [s]; less, where somebody is seen on the way that it left at ``begin``, and then nobody."""
+        place, begun, seen, result = request.motion.pose(), self.clock.now(), False, RecoveryResult(0)
+        while result.success and (left := begun + duration - self.clock.now()) > 0.0:
+            present = self._somebody_on_the_way(begin, place)
+            if seen and not present:
+                break
+            seen = seen or present
+            result = stand(request, min(left, WAIT_PERIOD))
+        waited = f"waited {self.clock.now() - begun:.3g} s"
+        return replace(result, message=waited) if result.success else result
+
+    def _somebody_on_the_way(self, begin: Pose, place: Pose) -> bool:
+        """Whether someone who is not parked is near the way from ``place`` back to ``begin`` and ``WAY_ON`` ahead."""
+        back, here = self.on_map(begin), self.on_map(place)
+        share = np.linspace(0.0, 1.0, 21)[:, None]
+        on = np.asarray(back.position) + share * back.rotation[:, 0] * WAY_ON
+        way = np.concatenate([np.asarray(here.position) + share * np.subtract(back.position, here.position), on])
+        known = self.navigation_map.tracked_objects(self.clock.now())
+        same_storey, near = self.navigation_map.same_storey, self.parameters.distance
+        return any(
+            one.motion is not Motion.PARKED
+            and abs(one.z - back.z) < same_storey
+            and float(norm(way[:, :2] - (one.x, one.y)).min()) < near
+            for one in known
+        )
 
     def _drive_along(self, begin: Pose, steps: list[Step], request: RecoveryRequest) -> RecoveryResult:
         frame = Transform(begin.position, begin.orientation, begin.frame_id, "begin")
@@ -222,9 +254,14 @@ class GiveWayRecovery(GuardedRecovery):
         paths = [rival.points_ahead(length) for rival in self._before(self._rivals())]
         keep_free = paths_to_keep_free(begin, self.robot.recent_track(), paths, length)
         start, turning_radius = self.on_map(begin), self.min_turning_radius
-        return find_pull_out(
-            self.navigation_map, start, keep_free, p.distance, p.reach, turning_radius, lambda: token.cancelled
-        )
+        known = () if self._rivals() else self.navigation_map.tracked_objects(self.clock.now())
+        for free in paths_beside(start, keep_free, known, p.distance, self.navigation_map.same_storey):
+            steps = find_pull_out(
+                self.navigation_map, start, free, p.distance, p.reach, turning_radius, lambda: token.cancelled
+            )
+            if steps is not None or token.cancelled:
+                return steps
+        return None
 
     # --------------------------------------------------------------------------------------------------- the drive
     def _follow(self, request: RecoveryRequest, poses: list[Pose], gear: int) -> RecoveryResult:

@@ -3,8 +3,8 @@
 The rule is passive motion safety (Macek, Vasquez, Fraichard, Siegwart 2009): a motion is safe if the robot can stand
 before any contact. Contacts that happen while it stands are not its fault. So a command is followed for a reaction
 time, then the robot brakes (``braking.py``); objects keep their velocities until it stands, or turn now. A turn is
-noticed after ``turning_time``; until then the object may be wherever it gets at its speed. While somebody who moves is
-nearer than the margin, or touches it, the robot stands.
+noticed after ``turning_time``; until then the object may be wherever it gets at its pace, the greatest speed of late.
+While somebody who moves is nearer than the margin, or touches it, the robot stands.
 """
 
 from __future__ import annotations
@@ -161,14 +161,14 @@ def _first_contact(
     """What the robot would touch before it stands, on the first of its motions on which it touches something."""
     middles = np.array([(known.x, known.y) for known in objects])
     velocities = np.array([(known.vx, known.vy) for known in objects])
-    speeds = np.array([known.speed for known in objects])
+    paces = np.array([max(known.pace, known.speed) for known in objects])
     radii = np.array([known.radius for known in objects]) + limits.contact_margin
     braking = Decelerations(limits.decel_lim_x, limits.decel_lim_theta, limits.reaction_time)
     for times, poses in motions_to_standstill(pose, velocity, command, share, braking):
         places = middles[None] + times[:, None, None] * velocities[None]
         contact = box.gaps(poses, places, radii) < 0.0
         if limits.turning_time > 0.0:
-            ways = np.minimum(times, limits.turning_time)[:, None] * speeds
+            ways = np.minimum(times, limits.turning_time)[:, None] * paces
             contact |= box.gaps(poses, np.broadcast_to(middles, places.shape), radii + ways) < 0.0
         if contact.any():
             return objects[int(np.argmax(contact[int(np.argmax(contact.any(axis=1)))]))]

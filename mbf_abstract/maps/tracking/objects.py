@@ -47,6 +47,9 @@ class TrackedObject:
         How long it has been standing [s]; 0 while it moves.
     stamp : float
         Time of all this [s].
+    pace : float
+        Greatest estimated speed of late [m/s]. Where an object turns round, the estimate of its velocity falls on its
+        way to the other side, and its speed does not.
     """
 
     number: int
@@ -64,6 +67,7 @@ class TrackedObject:
     standing: float
     stamp: float
     frame_id: str
+    pace: float = 0.0
 
     @property
     def speed(self) -> float:

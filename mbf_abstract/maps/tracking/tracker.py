@@ -207,6 +207,7 @@ class Tracker:
             z=state[states_of.Z],
             vx=vx,
             vy=vy,
+            pace=state[states_of.PACE] if moves else 0.0,
             radius=max(state[states_of.HALF_X], state[states_of.HALF_Y]),
             position_deviation=math.sqrt(state[states_of.VAR_POSITION]),
             velocity_deviation=math.sqrt(state[states_of.VAR_VELOCITY]),

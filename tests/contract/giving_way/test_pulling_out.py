@@ -8,6 +8,7 @@ import pytest
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.pull_out import find_pull_out, paths_to_keep_free
 from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
@@ -49,6 +50,31 @@ def test_in_a_hall_it_steps_aside(give_way):
     result, motion = give_way(hall, distance=0.6)
     assert result.outcome == RecoveryOutcome.SUCCESS
     assert 0.5 < abs(motion.end.y - 3.0) < 1.1 and abs(motion.end.x - 4.5) < 1.5
+
+
+def tracked(x, y, vx=0.0, motion=Motion.WAITING):
+    return TrackedObject(1, motion, x, y, 0.0, vx, 0.0, 0.3, 0.05, 0.1, 5.0, 0.0, 3.0, 0.0, "map")
+
+
+@pytest.mark.parametrize("aside", [-0.3, 0.3])
+def test_it_steps_aside_from_the_way_of_who_is_tracked_ahead_too(give_way, world, aside):
+    seen = world.sensing()
+    seen.tracked_objects = lambda now: (tracked(5.6, 3.0 + aside),)
+    result, motion = give_way(hall, distance=0.6, navigation_map=seen)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert abs(motion.end.y - 3.0 - aside) > 0.55 and abs(motion.end.y - 3.0) > 0.55
+
+
+def test_it_waits_no_longer_than_until_who_was_on_its_way_has_passed(give_way, world):
+    seen, asked = world.sensing(), []
+
+    def passing(now):
+        asked.append(now)
+        return (tracked(5.2 - 0.3 * (now - asked[0]), 3.0, -0.3, Motion.MOVING),)
+
+    seen.tracked_objects = passing
+    result, motion = give_way(hall, distance=0.6, navigation_map=seen, wait=30.0, random_extra=0.0)
+    assert result.success and motion.seconds < 15.0
 
 
 def test_where_the_drive_to_the_place_is_not_free_any_more_another_place_is_searched(give_way, world):

@@ -341,6 +341,21 @@ def test_a_robot_without_odometry_is_never_called_stuck(make_session):
     assert session.navigator.exe_path(session.path_to(2.0)).success
 
 
+def test_what_is_safe_for_a_robot_without_odometry_is_asked_as_if_it_moved_as_it_was_told(make_session, monkeypatch):
+    session, asked = make_session(), []
+    session.robot.odometry = lambda: None
+    session.controller.play(*[drive(0.1 * cycle) for cycle in range(1, 4)])
+
+    def avoid_contact(pose, velocity, answer):
+        asked.append((velocity, answer.command))
+        return answer
+
+    monkeypatch.setattr(session.navigator.server.runtime.map_hooks, "avoid_contact", avoid_contact)
+    assert session.navigator.exe_path(session.path_to(2.0)).success
+    velocities, commands = zip(*asked, strict=True)
+    assert velocities == (Twist(), *commands[:-1]) and len({*commands}) == 3
+
+
 def test_a_robot_that_moves_without_getting_anywhere_oscillates(make_session, states):
     session = make_session(oscillation_timeout=3.0, oscillation_distance=0.5)
     session.controller.play(*[drive(0.3 if i // 10 % 2 else -0.3) for i in range(400)])

@@ -8,7 +8,8 @@ import pytest
 from mbf_abstract.events import EventKind
 from mbf_abstract.executives.reference_trees import TreeOptions, control_tree, navigation_tree, planning_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.maps.queries import CellState
 from mbf_abstract.maps.tracking.blocking import Blockage
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RefinePathOutcome
@@ -126,19 +127,64 @@ def test_without_reuse_of_the_path_every_failure_costs_a_plan(make_session, reco
 @pytest.mark.parametrize("reuse_path", [True, False])
 @pytest.mark.parametrize(
     ("motion", "recovery", "plans_made"),
-    [(Motion.PARKED, [], 2), (Motion.MOVING, ["relax"], 1), (Motion.WAITING, ["relax"], 1)],
+    [(Motion.PARKED, [], 2), (Motion.MOVING, ["relax"], 1), (Motion.WAITING, [], 2)],
 )
 def test_who_is_in_the_way_decides_between_waiting_and_planning_around(
     make_session, recoveries, monkeypatch, reuse_path, motion, recovery, plans_made
 ):
     session = make_session()
     session.controller.play(BLOCKED, session.controller.follow)
-    somebody = Blockage(SimpleNamespace(motion=motion), 0, 1.0)
+    somebody = Blockage(SimpleNamespace(motion=motion, standing=3.0), 0, 1.0)
     monkeypatch.setattr(type(session.server), "queries", SimpleNamespace(what_blocks=lambda path: (somebody,)))
     options = replace(OPTIONS, wait="relax", give_way="back_up", reuse_path=reuse_path)
     result = run(session, navigation_tree(options))
     assert result.success, result.message
-    assert (plans(session), recoveries(session)) == (plans_made if reuse_path else 2, recovery)
+    if reuse_path:
+        assert (plans(session), recoveries(session)) == (plans_made, recovery)
+    else:  # every recovery is followed by a plan
+        assert (plans(session), recoveries(session)) == (2, [] if motion is Motion.PARKED else ["relax"])
+
+
+def on_the_path(session, monkeypatch, motion):
+    """Somebody has been standing a metre ahead for three seconds, and the map sees the path blocked there."""
+    somebody = Blockage(SimpleNamespace(motion=motion, standing=3.0), 0, 1.0)
+    blocked = SimpleNamespace(state=CellState.LETHAL)
+    queries = SimpleNamespace(what_blocks=lambda path: (somebody,), check_path=lambda *asked: blocked)
+    monkeypatch.setattr(type(session.server), "queries", queries)
+
+
+ASKING = replace(OPTIONS, wait="relax", give_way="back_up")
+
+
+@pytest.mark.parametrize(("motion", "speed", "asks"), [("parked", 0.5, 2), ("waiting", 0.5, 1), ("waiting", 0.1, 2)])
+def test_who_stands_is_planned_around_while_driving_if_parked_or_if_both_stand(
+    make_session, recoveries, monkeypatch, motion, speed, asks
+):
+    session = make_session()
+    on_the_path(session, monkeypatch, Motion(motion))
+    session.controller.play(*[drive(speed)] * 40, session.controller.follow)
+    options = replace(ASKING, second_planner_pause=8.0)
+    assert run(session, navigation_tree(options), Pose.planar(30.0, 0.0)).success
+    assert recoveries(session) == [] and len([r for r in session.planner.requests if r.start.x < 1.0]) == asks
+
+
+@pytest.mark.parametrize(
+    ("longer", "recovery"), [(4.0, []), (20.0, ["relax", "relax", "back_up", "relax"])], ids=["taken", "too long"]
+)
+def test_a_way_around_that_is_too_long_is_not_asked_for_again_at_once(
+    make_session, recoveries, monkeypatch, longer, recovery
+):
+    def around(request):
+        straight = straight_plan(request)
+        beyond = Pose.planar(straight.path[-1].x + 0.5 * longer, 0.0)
+        return replace(straight, path=Path.from_poses([*straight.path, beyond, straight.path[-1]]))
+
+    session = make_session()
+    on_the_path(session, monkeypatch, Motion.WAITING)
+    failing_for(session, BLOCKED, max(len(recovery), 1))
+    session.planner.play(straight_plan, around)
+    assert run(session, navigation_tree(ASKING)).success
+    assert (plans(session), recoveries(session)) == (2, recovery)
 
 
 def test_without_codes_recoveries_are_taken_in_their_fixed_order(make_session, recoveries):

@@ -235,7 +235,10 @@ def among(tree, *blockages, path=AHEAD, lost=False):
         assert of_path is path
         if lost:
             raise RobotStateError("where am I?")
-        return tuple(Blockage(SimpleNamespace(motion=motion), 0, distance) for motion, distance in blockages)
+        return tuple(Blockage(somebody(motion), 0, distance) for motion, distance in blockages)
+
+    def somebody(motion):
+        return SimpleNamespace(motion=motion, standing=0.0 if motion is Motion.MOVING else 1.4)
 
     navigator = SimpleNamespace(server=SimpleNamespace(queries=SimpleNamespace(what_blocks=what_blocks)))
     mission = SimpleNamespace(navigator=navigator, path=path, path_to_follow=lambda: path)
@@ -278,6 +281,12 @@ def test_what_was_tried_against_one_that_waits_is_remembered_while_others_pass(s
     for motion in (Motion.WAITING, Motion.MOVING, Motion.WAITING):
         assert tick(among(tree, (motion, 1.0))) == "S"
     assert (wait.ticks, give_way.ticks) == (1, 1)
+
+
+def test_who_stands_for_too_short_a_time_to_know_counts_as_moving(scripted, tick):
+    for standing, chosen in ((1.4, "S"), (1.5, "F")):
+        tree = PickByMotion("who?", {Motion.WAITING: scripted("S")}, scripted("S"), standing=standing)
+        assert tick(among(tree, (Motion.WAITING, 1.0))) == chosen
 
 
 def test_one_node_may_stand_for_several_motions_and_for_nobody(scripted, tick):

@@ -131,5 +131,21 @@ def test_a_standing_robot_that_is_touched_or_pushed_has_not_moved(phases: tuple[
     assert contacts_while_moving(*phases) == 0
 
 
+ROLLING = {"rolling": Twist.planar(0.3)}
+
+
+def test_wheels_that_roll_on_from_a_push_are_no_motion_in_the_next_contact() -> None:
+    assert contacts_while_moving({}, PERSON | ROLLING, ROLLING, PERSON | ROLLING) == 0
+
+
+@pytest.mark.parametrize("between", [{}, DRIVEN], ids=["stood", "was told to drive"])
+def test_wheels_that_roll_after_a_push_count_again_once_the_robot(between: dict[str, object]) -> None:
+    assert contacts_while_moving({}, PERSON | ROLLING, between, ROLLING, PERSON) == 1
+
+
+def test_wheels_that_roll_on_from_a_drive_into_somebody_are_motion() -> None:
+    assert contacts_while_moving(DRIVEN, PERSON | DRIVEN, ROLLING, PERSON) == 2
+
+
 def test_each_new_contact_counts() -> None:
     assert contacts_while_moving(PERSON | DRIVEN, DRIVEN, PERSON | DRIVEN) == 2

@@ -137,6 +137,13 @@ def test_beside_somebody_who_could_turn_to_it_the_robot_is_slower_or_stands():
     assert found == sorted(found)
 
 
+def test_who_turns_round_may_be_wherever_the_pace_of_before_leads():
+    turning = moving(1.3, 0.0, -0.05)
+    assert share_of(AHEAD, turning, limits=TURNING) == 1.0
+    assert share_of(AHEAD, replace(turning, pace=1.2), limits=TURNING) < 1.0
+    assert share_of(AHEAD, replace(turning, pace=1.2)) == 1.0, "nobody turns"
+
+
 def test_a_robot_does_not_drive_up_close_to_whom_it_follows():
     assert share_of(AHEAD, moving(0.75, 0.0, 0.8), limits=TURNING) == 0.0
     assert share_of(AHEAD, moving(1.6, 0.0, 0.8), limits=TURNING) == 1.0

@@ -170,6 +170,25 @@ def test_a_turn_is_known_two_scans_later(vx, vy):
         assert error < math.hypot(person.vx, person.vy - 0.8), f"seed {seed}: {person.vx:.2f}, {person.vy:.2f}"
 
 
+def test_who_turns_round_keeps_most_of_the_pace_although_the_estimated_velocity_falls():
+    there = walk(2.5, -1.0, 0.0, 1.1, 20)
+    places = there + walk(*there[-1], 0.0, -1.1, 8)[1:]
+    tracker, speeds, paces = Tracker(TrackingParameters(), "map"), [], []
+    for step, place in enumerate(places):
+        tracker.insert(disc(*place), SENSOR, step * PERIOD)
+        for person in tracker.objects(step * PERIOD)[:1] if step >= len(there) else ():
+            speeds.append(person.speed)
+            paces.append(person.pace)
+    assert min(speeds) < 0.7 and min(paces) > 0.75
+
+
+def test_who_slows_down_gently_is_as_fast_as_estimated():
+    speed = np.clip(1.2 - 0.5 * PERIOD * np.arange(20), 0.0, None)
+    tracker, now = follow([(2.5, y) for y in np.cumsum(PERIOD * speed) - 1.0])
+    (person,) = tracker.objects(now)
+    assert person.pace == person.speed
+
+
 def test_noticing_turns_costs_no_accuracy_of_those_who_walk_straight_on():
     def error(turning_deviation):
         errors = []

@@ -26,14 +26,14 @@ from mbf_abstract.maps.tracking.kernels.compiled import kernel
 FloatArray = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-STATE_COLUMNS = 20
+STATE_COLUMNS = 21
 X, Y, Z, VX, VY, VAR_POSITION, COVARIANCE, VAR_VELOCITY, HALF_X, HALF_Y = range(10)
-FIRST_SEEN, LAST_SEEN, SCANS, ANCHOR_X, ANCHOR_Y, ANCHOR_TIME, HAS_MOVED, CLEARED, OFF_X, OFF_Y = range(
+FIRST_SEEN, LAST_SEEN, SCANS, ANCHOR_X, ANCHOR_Y, ANCHOR_TIME, HAS_MOVED, CLEARED, OFF_X, OFF_Y, PACE = range(
     10, STATE_COLUMNS
 )
 """Columns of the state of an object. It stood at its anchor at ``ANCHOR_TIME`` [s]; ``HAS_MOVED`` is 0 or 1, and so is
 ``CLEARED``: whether it was cleared and not seen since. In its last scan it was ``OFF`` [m] away from where it was
-expected."""
+expected. ``PACE`` [m/s] is its greatest speed of late."""
 NOBODY = -1
 TURNED = 0.5
 """An object has turned if it is off to the same side in two scans, by this many standard deviations: the geometric mean
@@ -42,7 +42,10 @@ of both scans."""
 
 @kernel
 def predict(states: FloatArray, seconds: float, acceleration_deviation: float) -> None:
-    """Move the ``states`` (n, STATE_COLUMNS) on by some time [s]; the deviation [m/s^2] is that of the noise."""
+    """Move the ``states`` (n, STATE_COLUMNS) on by some time [s]; the deviation [m/s^2] is that of the noise.
+
+    The pace falls by the deviation: what slows down as usual is not taken to be faster than it is.
+    """
     square = seconds * seconds
     q = acceleration_deviation * acceleration_deviation
     for i in range(len(states)):
@@ -52,6 +55,7 @@ def predict(states: FloatArray, seconds: float, acceleration_deviation: float) -
         state[VAR_POSITION] += 2.0 * seconds * state[COVARIANCE] + square * state[VAR_VELOCITY] + 0.25 * q * square**2
         state[COVARIANCE] += seconds * state[VAR_VELOCITY] + 0.5 * q * square * seconds
         state[VAR_VELOCITY] += q * square
+        state[PACE] = max(state[PACE] - acceleration_deviation * seconds, 0.0)
 
 
 @kernel
@@ -163,6 +167,7 @@ def correct(
         state[COVARIANCE] -= gain * state[COVARIANCE]
         state[VAR_POSITION] -= gain * state[VAR_POSITION]
         state[Z] = box[MEAN_Z]
+        state[PACE] = max(state[PACE], np.sqrt(state[VX] * state[VX] + state[VY] * state[VY]))
         state[LAST_SEEN] = stamp
         state[SCANS] += 1.0
         state[CLEARED] = 0.0
