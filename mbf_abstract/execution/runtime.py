@@ -71,7 +71,7 @@ class Runtime:
     """What runs on although its goal has ended: a call that does not come back; capped by ``max_quarantined``."""
 
     def velocity_or_command(self, measured: Twist | None) -> Twist:
-        """How the robot moves: as measured, and without odometry as it was last told to, straight on for a car."""
+        """How the robot moves: as measured, and without odometry as last commanded, straight on for a car."""
         if measured is not None:
             return measured
         command = self.gate.last_command
