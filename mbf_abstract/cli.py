@@ -20,8 +20,8 @@ from mbf_abstract.config.installed_plugins import DISTRIBUTION, installed_points
 
 COMMANDS_GROUP = "mbf.commands"
 YOUNG_OBJECTS = 50_000
-"""New objects between two collections of garbage. With Python's own 700 or 2,000 a sixth of ``mbf plan`` is spent on
-what a thousand imported modules define, of which nothing is garbage."""
+"""New objects between two collections of garbage. What a thousand imported modules define is no garbage; looking at it
+takes 80 ms of ``mbf plan`` with Python's own 700, and 40 ms with this."""
 
 
 def make_app() -> typer.Typer:
