@@ -34,6 +34,7 @@ def save_map(
 
     Parameters
     ----------
+    image_format : {"pgm", "png", "bmp"}
     mode : MapMode or its value
         Trinary keeps 0, 100 and unknown; raw keeps every value; scale keeps 0..100, and unknown only in a png.
     occupied_thresh, free_thresh : float

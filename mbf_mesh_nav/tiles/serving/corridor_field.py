@@ -69,6 +69,7 @@ class CorridorField:
 
     def _new(self, plan: TiledPlan, goal: TilePlace, cancel_flag: FlagArray) -> _Field | None:
         """The field of a plan that was searched just now; None if it is cancelled."""
+        self._tiled.hold(list(plan.tiles))  # a wider corridor than that of the plan may have taken their places
         graph, firsts = self._graph(plan.tiles), self._firsts(plan.tiles)
         distances = np.full(len(graph.blocked), np.inf, dtype=np.float32)
         predecessors = np.full(len(graph.blocked), -1, dtype=np.int32)
