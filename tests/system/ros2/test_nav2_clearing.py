@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-pytestmark = [pytest.mark.ros2, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
 CLIENT, OPTIONS = "commander.py", ("--amcl",)
 CONFIG = """
 backend: costmap

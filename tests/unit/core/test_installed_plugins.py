@@ -1,6 +1,8 @@
 """Entry points of installed packages are read once, and again when a package comes or goes."""
 
 import importlib.metadata
+import itertools
+import os
 
 import pytest
 
@@ -14,12 +16,14 @@ GROUP = "mbf.planners"
 def install(tmp_path, monkeypatch):
     """Put a distribution with a planner into a folder of the Python path."""
     monkeypatch.syspath_prepend(tmp_path)
+    stamps = itertools.count(1)
 
     def install(name):
         info = tmp_path / f"{name}-1.0.dist-info"
         info.mkdir()
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
         (info / "entry_points.txt").write_text(f"[{GROUP}]\n{name} = {name}:Planner\n")
+        os.utime(tmp_path, (stamp := next(stamps), stamp))  # a fast machine may install two within a tick of its clock
 
     return install
 
@@ -41,6 +45,7 @@ def test_a_package_that_was_installed_meanwhile_is_seen(install):
 def test_what_has_not_changed_is_read_once(monkeypatch):
     reads = []
     monkeypatch.setattr(installed_plugins, "entry_points", lambda: reads.append(1) or importlib.metadata.entry_points())
+    monkeypatch.setattr(installed_plugins, "_changes_of_path", tuple)  # other tests may write into a folder of the path
     installed_plugins._all_points.cache_clear()
 
     assert [bool(installed_points(group)) for group in (GROUP, "mbf.servers", "mbf.nothing")] == [True, True, False]
