@@ -24,6 +24,7 @@ from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.ros2.clients import GoalClients, action_clients
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
+from mbf_ros.ros2.running import settle
 
 Outcomes: TypeAlias = (
     type[GetPathOutcome]
@@ -181,11 +182,10 @@ class ServedAction:
         self._goals[key], more = handle, self._observe(goal_handle, handle)
         self._clients.welcome(key)
         try:
-            executor = self._node.executor
-            ended = Future(executor=executor)
+            ended = Future(executor=self._node.executor)
             if self._mapping.feedback is not None:
                 handle.add_feedback_callback(lambda feedback: self._publish_feedback(goal_handle, feedback, more))
-            handle.add_done_callback(lambda done: executor.create_task(ended.set_result, done))
+            handle.add_done_callback(partial(settle, ended, self._node.executor))
             await ended
         except Exception:
             handle.cancel("the node failed")

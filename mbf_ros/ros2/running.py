@@ -41,6 +41,16 @@ def ros_2(arguments: Sequence[str] = ()) -> Iterator[None]:
         rclpy.try_shutdown()
 
 
+def settle(future: Any, executor: Any, value: Any) -> None:
+    """Give a future its value and wake the executor for the coroutine that awaits it; on any thread.
+
+    A task that sets the value would run after that coroutine has had its turn, and a value alone wakes nobody: the
+    coroutine would go on with whatever comes next.
+    """
+    future.set_result(value)
+    executor.wake()
+
+
 class Spinner:
     """Runs the callbacks of a node on one thread until it is closed, or one of them raises.
 

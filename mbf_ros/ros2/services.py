@@ -15,6 +15,7 @@ from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.messages.mbf_queries import MAP_QUESTIONS, MapQuestion
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
+from mbf_ros.ros2.running import settle
 
 MAX_CALLS = 20
 """How many questions may be worked on at a time."""
@@ -91,7 +92,7 @@ class ServedQueries:
             except Exception as error:  # of a map, a transform or a request
                 self._node.get_logger().warning(f"{name}: {type(error).__name__}: {error_text(error)}")
                 answer = None
-            executor.create_task(done.set_result, answer)
+            settle(done, executor, answer)
 
         self._calls += 1
         self._server.runtime.clock.spawn(run, f"service {name}")
