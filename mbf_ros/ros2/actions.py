@@ -44,6 +44,9 @@ ACTIONS: dict[str, tuple[ActionMapping[Any, Any], Outcomes]] = {
 """Mapping and outcomes by the private names of the actions."""
 MAX_GOALS = 50
 """How many goals of one action may be unfinished at a time."""
+QUEUE = 2 * MAX_GOALS
+"""How many requests of each kind, and answers, of one action may wait to be taken; of ROS 2's usual 10, goals that come
+at once are lost and neither accepted nor rejected."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,7 @@ class ServedAction:
         self, node: Any, name: str, mapping: ActionMapping[Any, Any], outcomes: Outcomes, serving: Serving
     ) -> None:
         from rclpy.action import ActionServer
+        from rclpy.qos import QoSProfile
 
         self._node, self._mapping, self._outcomes = node, mapping, outcomes
         self._serving, self._context = serving, serving.context
@@ -104,6 +108,9 @@ class ServedAction:
             goal_callback=self._accept,
             handle_accepted_callback=self._begin,
             cancel_callback=self._cancel,
+            goal_service_qos_profile=QoSProfile(depth=QUEUE),
+            result_service_qos_profile=QoSProfile(depth=QUEUE),
+            cancel_service_qos_profile=QoSProfile(depth=QUEUE),
         )
 
     def abort_all(self, message: str) -> None:

@@ -21,6 +21,8 @@ def read_run_points(folder: Path, max_points: int) -> FloatArray:
         There is no recording in the folder, it is damaged, has no range sensor, or more than ``max_points`` hits.
     """
     file = folder / "recording.npz"
+    if not file.exists():
+        raise RecordingError(f"expected the folder of a run, there is no {file.name} in it")
     try:
         arrays = read_arrays(file, BYTES_A_POINT * max_points, (SCANS,))
     except (OSError, ArrayFileError) as error:

@@ -4,7 +4,6 @@ The wheels start each Python of their environment anew with other library paths,
 """
 
 import ctypes
-import fcntl
 import hashlib
 import os
 import platform
@@ -132,6 +131,8 @@ def locked(path, seconds):
 
 def free_domain(root, closing):
     """Return a domain that no other trio on this machine has, and keep it until ``closing`` ends."""
+    import fcntl  # not on Windows, where tests that need no domain import this module
+
     for domain in DOMAINS:
         lock = closing.enter_context(open(root / f"domain-{domain}", "w"))
         try:

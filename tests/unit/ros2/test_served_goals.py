@@ -37,7 +37,10 @@ def callbacks(monkeypatch):
     rclpy_action = ModuleType("rclpy.action")
     rclpy_action.ActionServer = lambda node, kind, name, **given: callbacks.update(given)
     rclpy_action.GoalResponse = SimpleNamespace(ACCEPT="accept", REJECT="reject")
+    rclpy_qos = ModuleType("rclpy.qos")
+    rclpy_qos.QoSProfile = lambda depth: depth
     monkeypatch.setitem(sys.modules, "rclpy", ModuleType("rclpy"))
+    monkeypatch.setitem(sys.modules, "rclpy.qos", rclpy_qos)
     monkeypatch.setitem(sys.modules, "rclpy.action", rclpy_action)
     monkeypatch.setattr(actions, "interface_class", lambda name: None)
     return callbacks

@@ -49,6 +49,8 @@ rclpy.init()
 node = rclpy.create_node("client")
 clients = {name: ActionClient(node, kind, f"/move_base_flex/{name}") for name, kind in ACTIONS.items()}
 services = {name: node.create_client(kind, f"/move_base_flex/{name}") for name, kind in SERVICES.items()}
+queues = {f"{name}_service_qos_profile": QoSProfile(depth=100) for name in ("goal", "result", "cancel")}
+many_recoveries = ActionClient(node, Recovery, "/move_base_flex/recovery", **queues)
 initial_pose = node.create_publisher(PoseWithCovarianceStamped, "initialpose", 10)
 handles, shown_goals = {}, []
 
@@ -59,7 +61,7 @@ def say(**fields):
 
 
 def meet(key):
-    for client in clients.values():
+    for client in (*clients.values(), many_recoveries):
         client.wait_for_server()
     for client in services.values():
         client.wait_for_service()
@@ -151,6 +153,28 @@ def repeat(key, number):
     ask()
 
 
+def burst(key, number):
+    """Send so many recoveries at once, cancel all at once when all are accepted, and count the outcomes."""
+    taken, outcomes = [], collections.Counter()
+
+    def accepted(future):
+        taken.append(future.result())
+        future.result().get_result_async().add_done_callback(ended)
+        if len(taken) == number:
+            say(key=key, what="accepted", number=sum(one.accepted for one in taken))
+            for one in taken:
+                one.cancel_goal_async()
+
+    def ended(future):
+        outcomes[future.result().result.outcome] += 1
+        if outcomes.total() == number:
+            say(key=key, what="over", outcomes=outcomes)
+
+    for slot in range(1, number + 1):
+        goal = Recovery.Goal(behavior="long_pause", concurrency_slot=slot)
+        many_recoveries.send_goal_async(goal).add_done_callback(accepted)
+
+
 def cancel(key):
     handles[key].cancel_goal_async()
 
@@ -227,6 +251,7 @@ node.create_subscription(PoseStamped, "/simulator/goal", take_shown_goal, latche
 orders = {
     "send": send,
     "repeat": repeat,
+    "burst": burst,
     "cancel": cancel,
     "call": call,
     "get": get,
