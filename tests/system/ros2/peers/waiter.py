@@ -1,5 +1,6 @@
 """Coroutines that await values of another thread, on an executor to which nothing else comes."""
 
+import sys
 import threading
 import time
 
@@ -32,4 +33,4 @@ async def add_up():
 task = executor.create_task(add_up)
 while not task.done():
     executor.spin_once()
-print(task.result())
+sys.stdout.write(f"{task.result()}\n")
