@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.actions.stuck_monitor import StuckMonitor
+from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_types import ActionResult, ExePathFeedback, ExePathResult, GetPathResult
 from mbf_abstract.goals.handle import AnyGoalHandle
@@ -92,6 +93,13 @@ class MissionContext:
     def robot_pose(self) -> Pose:
         """Fresh robot pose in the global frame; raises RobotStateError."""
         return self.navigator.robot_pose()
+
+    def robot_is_slower_than(self, speed: float) -> bool:
+        """Whether the robot's speed is known and below ``speed`` [m/s]."""
+        try:
+            return self.navigator.server.runtime.robot.velocity().speed < speed
+        except RobotStateError:
+            return False
 
     def required_target(self) -> Pose:
         """Return the target; raises ValueError where the mission has none."""

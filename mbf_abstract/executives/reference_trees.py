@@ -20,12 +20,10 @@ from py_trees.behaviours import Success
 from py_trees.common import ParallelPolicy
 from py_trees.composites import Parallel, Sequence
 
-from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.conditions import BEYOND_RECOVERY, Do, recovery_would_help
 from mbf_abstract.executives.escalation import Escalation
 from mbf_abstract.executives.leaves import Detour, ExePath, GetPath, Recovery, UpdatePath
 from mbf_abstract.executives.map_leaves import CheckPose, PathBlocked
-from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.executives.pacing import Delay, InBackground
 from mbf_abstract.executives.recovering import (
     InOrder,
@@ -184,21 +182,12 @@ def _second_planner(options: TreeOptions) -> Behaviour:
     if options.wait:  # what moves is waited for: a path around where it is now would lead through where it goes
         around = _detour("update path", options, planner, SECOND_PLANNER_SLOT)
         passing = _detour("pass it", options, planner, SECOND_PLANNER_SLOT)
-        if_it_waits_for_us = Sequence(
-            "both stand", memory=True, children=[Do("robot stands?", _nearly_stands), passing]
-        )
+        creeps = Do("robot stands?", lambda mission: mission.robot_is_slower_than(CREEPING))
+        if_it_waits_for_us = Sequence("both stand", memory=True, children=[creeps, passing])
         for_standing: dict[Motion, Behaviour] = {Motion.WAITING: if_it_waits_for_us, Motion.PARKED: around}
         update = PickByMotion("who blocks it?", for_standing, nobody=around, standing=STANDING)
     blocked = PathBlocked("path blocked?", options.second_planner_look_ahead)
     return Sequence("update a blocked path", memory=True, children=[blocked, update])
-
-
-def _nearly_stands(mission: MissionContext) -> bool:
-    """Whether the robot is as slow as one that creeps up to what it cannot pass."""
-    try:
-        return mission.navigator.server.runtime.robot.velocity().speed < CREEPING
-    except RobotStateError:
-        return False
 
 
 def _detour(name: str, options: TreeOptions, planner: str, slot: int = 0) -> Behaviour:
