@@ -50,7 +50,12 @@ def to_json_value(value: Any) -> JsonValue:
     """
     if value is None or type(value) is bool:
         return value
-    if type(value) is str and len(value) <= MAX_TEXT and value.isascii():  # most fields; others need a converter
+    # Most fields are plain text and plain numbers; the others need a converter.
+    if type(value) is str and len(value) <= MAX_TEXT and value.isascii():
+        return value
+    if type(value) is float:
+        return _plain_float(value)
+    if type(value) is int and value.bit_length() <= MAX_INTEGER_BITS:
         return value
     try:
         return _Converter().convert(value, 0)
@@ -67,6 +72,8 @@ class _Converter:
     def convert(self, value: Any, depth: int) -> JsonValue:
         """Convert a value that is nested ``depth`` deep."""
         self._left -= 1
+        if type(value) is float:  # coordinates, most of what is nested
+            return _plain_float(value)
         if isinstance(value, Enum):
             return value.name
         if isinstance(value, np.generic):
@@ -76,7 +83,7 @@ class _Converter:
         if isinstance(value, int):
             return value if value.bit_length() <= MAX_INTEGER_BITS else f"integer of {value.bit_length()} bits"
         if isinstance(value, float):
-            return round(value, FLOAT_DIGITS) + 0.0 if math.isfinite(value) else str(value)  # + 0.0: no "-0.0"
+            return _plain_float(value)
         if isinstance(value, (Mapping, np.ndarray, list, tuple)):
             return self._convert_collection(value, depth)
         text = well_formed(shortened(_text_of(value)))
@@ -105,6 +112,10 @@ class _Converter:
                 return {**converted, "...": f"{len(value) - len(converted)} more values left out"}
             converted[shortened(_text_of(key))] = self.convert(item, depth + 1)
         return converted
+
+
+def _plain_float(value: float) -> JsonValue:
+    return round(value, FLOAT_DIGITS) + 0.0 if math.isfinite(value) else str(value)  # + 0.0: no "-0.0"
 
 
 def _text_of(value: object) -> str:

@@ -34,7 +34,7 @@ from mbf_abstract.maps.tracking.moving_obstacles import (
 )
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.arrays import FloatArray, IntArray
+from mbf_mesh_nav.arrays import FloatArray, IntArray, sorted_once
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 from mbf_mesh_nav.map.layer import (
     NOTHING_CHANGED,
@@ -91,7 +91,7 @@ class MovingObstaclesLayer(TrackingLayer, MeshLayer):
         spots = self.locator.locate(places, AT_VERTEX)
         known = spots.faces >= 0
         corners = np.argmax(spots.barycentric[known], axis=1)
-        return np.unique(self.topology.faces[spots.faces[known], corners])
+        return sorted_once(self.topology.faces[spots.faces[known], corners])
 
     @classmethod
     def reach(cls, parameters: Any) -> float:
@@ -174,7 +174,7 @@ class MovingObstaclesLayer(TrackingLayer, MeshLayer):
         return union_of([left, before])
 
     def _corners(self, faces: IntArray) -> IntArray:
-        return np.unique(self.topology.faces[faces])
+        return sorted_once(self.topology.faces[faces])
 
     def _predict(self, now: float) -> None:
         """Replace the predictions by those of ``now`` [s]."""
@@ -198,4 +198,4 @@ class MovingObstaclesLayer(TrackingLayer, MeshLayer):
         for cost, middle in zip(costs.astype(np.float32), points, strict=True):  # NaN off the surface
             inside = near[norm(mesh.vertices[near] - middle) <= radius]
             self._prediction[inside] = np.maximum(self._prediction[inside], cost)
-        return np.unique(near[self._prediction[near] > 0.0])
+        return sorted_once(near[self._prediction[near] > 0.0])

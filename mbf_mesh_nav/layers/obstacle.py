@@ -25,7 +25,7 @@ from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
+from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray, sorted_once
 from mbf_mesh_nav.map.layer import (
     NOTHING_CHANGED,
     CostArray,
@@ -220,9 +220,9 @@ class ObstacleLayer(MeshLayer):
 
     def _change(self, hits: Hits) -> IntArray:
         """Replace the hits and write only the vertices that change."""
-        before = np.unique(self.topology.faces[self._hits.faces])
+        before = sorted_once(self.topology.faces[self._hits.faces])
         self._hits = hits
-        after = np.unique(self.topology.faces[self._hits.faces])
+        after = sorted_once(self.topology.faces[self._hits.faces])
         self._costs[before], self._lethal[before] = 0.0, False
         self._costs[after], self._lethal[after] = np.inf, True
         return np.setxor1d(before, after, assume_unique=True)

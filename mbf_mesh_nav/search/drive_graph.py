@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry.arithmetic import arctan2, norm
-from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray, sorted_once
 from mbf_mesh_nav.kernels.search.goal_bound import Arrivals
 from mbf_mesh_nav.kernels.search.heading_astar import HEADING_STEP, HEADINGS, Moves
 from mbf_mesh_nav.kernels.search.move_weights import weights_of_moves
@@ -74,7 +74,7 @@ class DriveGraph:
     def ends_from(self, vertices: IntArray) -> IntArray:
         """Vertices (n,) that moves from some vertices (k,) lead to, ascending."""
         offsets = self.moves.offsets
-        return np.unique(
+        return sorted_once(
             np.concatenate([self.moves.ends[offsets[one] : offsets[one + 1]] for one in vertices.tolist()])
         )
 

@@ -5,7 +5,7 @@ import pytest
 
 from mbf_abstract.maps.layers.layer_list import LayerListError, dependency_order
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.arrays import IntArray
+from mbf_mesh_nav.arrays import IntArray, sorted_once
 from mbf_mesh_nav.layers.border import BorderLayer
 from mbf_mesh_nav.layers.combinations.max_combination import MaxCombinationLayer
 from mbf_mesh_nav.layers.combinations.mean import MeanLayer
@@ -284,3 +284,12 @@ def test_values_of_a_layer_cannot_be_written_from_outside():
 def test_the_union_of_changes_names_each_vertex_once_and_in_order(sets):
     union = union_of([np.array(vertices, dtype=np.int32) for vertices in sets])
     assert union.dtype == np.int32 and union.tolist() == sorted(set().union(*sets))
+
+
+@pytest.mark.parametrize("shape", [(0,), (0, 3), (1,), (40,), (30, 3)])
+def test_sorted_once_is_the_set_of_the_numbers_in_order(shape):
+    numbers = np.random.default_rng(4).integers(0, 20, shape).astype(np.int32)
+
+    found = sorted_once(numbers)
+
+    assert found.dtype == np.int32 and found.tolist() == sorted(set(numbers.ravel().tolist()))
