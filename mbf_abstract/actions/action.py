@@ -32,6 +32,10 @@ PREEMPTED = "preempted by a new goal"
 SHUT_DOWN = "the server is shut down"
 
 
+def _nothing() -> None:
+    """Do nothing, for a job that need not know that it has an offer."""
+
+
 class GoalJob(Generic[G, R, F]):
     """A goal as its slot's worker runs it; while it runs, a newer goal of the slot may take it over."""
 
@@ -41,7 +45,7 @@ class GoalJob(Generic[G, R, F]):
         self.slot = slot
         self._condition = action._condition
         self._accepts: Callable[[G], bool] | None = None
-        self._on_offer: Callable[[], None] = lambda: None
+        self._on_offer: Callable[[], None] = _nothing
         self._offered: GoalJob[G, R, F] | None = None
 
     # ------------------------------------------------------------------------------ for the slot's worker
@@ -91,7 +95,7 @@ class GoalJob(Generic[G, R, F]):
     # ---------------------------------------------------------------------- take-over by a newer goal
     @contextmanager
     def open_to_take_over(
-        self, accepts: Callable[[G], bool], on_offer: Callable[[], None] = lambda: None
+        self, accepts: Callable[[G], bool], on_offer: Callable[[], None] = _nothing
     ) -> Iterator[None]:
         """Let newer goals of the slot take this job over while the body runs, without an end in between.
 

@@ -62,7 +62,7 @@ class PluginAction(Action[G, R, F], Generic[G, R, F, P]):
     ) -> PluginRun[P]:
         """Supervise the plugin for a goal; ``stop_robot`` is called with the reason before a goal ends that hangs."""
 
-        def end() -> None:
+        def end(run: PluginRun[P]) -> None:
             stop_robot(f"{run.suspect} hangs")
             job.end_take_over()
             if job.handle.cancel_requested:
@@ -72,5 +72,4 @@ class PluginAction(Action[G, R, F], Generic[G, R, F, P]):
                 text = f"{run.suspect} gave no answer within {run.patience:g} s and its grace"
                 job.abandon(self.patience_outcome, text)
 
-        run: PluginRun[P] = PluginRun(self.runtime, plugin, job.handle, lambda: self.patience, end)
-        return run
+        return PluginRun(self.runtime, plugin, job.handle, lambda: self.patience, end)

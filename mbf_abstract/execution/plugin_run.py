@@ -47,7 +47,8 @@ class PluginRun(Generic[P]):
     patience : callable
         Answers the present limit [s]; 0 = none.
     on_abandon : callable
-        Ends the goal when a call hangs; called once, on the supervisor's thread or on the one that comes back late.
+        Ends the goal of the run, its argument, when a call hangs; called once, on the supervisor's thread or on the
+        one that comes back late.
 
     Attributes
     ----------
@@ -63,7 +64,7 @@ class PluginRun(Generic[P]):
         plugin: LoadedPlugin[P],
         handle: AnyGoalHandle,
         patience: Callable[[], float],
-        on_abandon: Callable[[], None],
+        on_abandon: Callable[[PluginRun[P]], None],
     ) -> None:
         self.runtime = runtime
         self.plugin = plugin
@@ -294,5 +295,5 @@ class PluginRun(Generic[P]):
             )
         else:
             self.plugin.release(self)
-        self._on_abandon()
+        self._on_abandon(self)
         return None

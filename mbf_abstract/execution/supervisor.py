@@ -18,6 +18,10 @@ Check = Callable[[], float | None]
 RETRY = 0.1  # s until a check that has raised is asked again
 
 
+def _nothing_due() -> None:
+    """Take the place of a check that is forgotten: its owner keeps the watch, and would keep itself by the check."""
+
+
 class Watch:
     """One registered check; keep it to poke or stop it."""
 
@@ -62,6 +66,7 @@ class Supervisor:
         with self._condition:
             if watch in self._watches:
                 self._watches.remove(watch)
+                watch.check = _nothing_due
                 if self._closed and not self._watches:
                     self._condition.notify_all()
 

@@ -1,6 +1,8 @@
 """What all actions share: slots, preemption, handles in three styles, callbacks, closing; F-numbers are facts."""
 
 import asyncio
+import gc
+import weakref
 from dataclasses import replace
 
 import pytest
@@ -371,3 +373,19 @@ def test_too_many_hung_plugins_make_the_server_refuse_goals(make_session):
     hang.release()
     session.clock.sleep(0.1)
     assert send(session, "p1").wait().success
+
+
+def test_a_goal_that_is_over_leaves_nothing_to_the_garbage_collector(make_session):
+    session = make_session()
+    gc.collect()
+    gc.disable()
+    try:
+        over = send(session)
+        over.wait()
+        kept = weakref.ref(over)
+        del over
+        send(session).wait()  # the thread of the slot holds its last goal until the next comes
+        session.clock.sleep(1.0)
+        assert kept() is None
+    finally:
+        gc.enable()

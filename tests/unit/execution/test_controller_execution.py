@@ -33,7 +33,7 @@ def run_execution(session, plan):
     session.clock.sleep(0.1)
     plugin = session.server.plugins.get(PluginKind.CONTROLLER, "")
     plans = [plan]
-    run = PluginRun(session.server.runtime, plugin, handle, lambda: 5.0, lambda: None)
+    run = PluginRun(session.server.runtime, plugin, handle, lambda: 5.0, lambda _: None)
     handle.cancel_requested = False
     with run:
         return ControllerExecution(run, lambda: plans.pop() if plans else None, lambda pose, result: None).execute()
