@@ -28,6 +28,8 @@ from numba.core import event
 
 from mbf_abstract.compiling.compilation import CompilerClock
 
+_OPTIONS: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True}
+"""Kernels run without the interpreter lock; none is called from C, so the wrapper for that is not compiled."""
 _deciding_where = threading.Lock()
 
 
@@ -53,11 +55,11 @@ def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
         return function
     cache = _cache_folder(_folder_of_kernels(Path(inspect.getfile(function))))
     if cache is None:
-        return njit(nogil=True, **options)(function)
+        return njit(**_OPTIONS, **options)(function)
     with _deciding_where:  # numba asks for the folder once, when it wraps the function
         usual, config.CACHE_DIR = config.CACHE_DIR, str(cache)
         try:
-            return njit(cache=True, nogil=True, **options)(function)
+            return njit(cache=True, **_OPTIONS, **options)(function)
         finally:
             config.CACHE_DIR = usual
 

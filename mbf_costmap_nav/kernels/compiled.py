@@ -3,6 +3,10 @@
 Nothing is compiled at import: numba specialises a kernel at its first call and keeps the machine code on disk, until a
 file of this folder changes. Kernels run without the interpreter lock and in strict IEEE arithmetic, so NaN and inf keep
 their meaning.
+
+Two habits keep a first start short. Rows of arrays are copied by loops: a slice that is assigned to brings in the
+string formatting of its error's text, a second of compilation. The largest and the least of an array are found by
+loops: ``max()`` and ``min()`` of an array are up to four more functions of numba.
 """
 
 from __future__ import annotations

@@ -26,8 +26,8 @@ Count: Any = np.int64
 """Type of counters and codes handed on to other kernels."""
 
 
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
-"""No kernel is called from C, and divisions by zero follow IEEE arithmetic instead of raising."""
+OPTIONS: dict[str, Any] = {"error_model": "numpy"}
+"""Divisions by zero follow IEEE arithmetic instead of raising."""
 
 
 def kernel(function: KernelFunction) -> KernelFunction:

@@ -128,12 +128,17 @@ def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntAr
         A corner and the two sides from it of every triangle; those that do not exist are points.
     """
     lower, upper = np.empty((len(faces), 3), dtype=np.float64), np.empty((len(faces), 3), dtype=np.float64)
+    centres = np.empty((len(faces), 3), dtype=np.float64)
     for face in range(len(faces)):
         for axis in range(3):
             a, b, c = vertices[faces[face, 0], axis], vertices[faces[face, 1], axis], vertices[faces[face, 2], axis]
             lower[face, axis], upper[face, axis] = min(a, b, c), max(a, b, c)
-    centres, order = 0.5 * (lower + upper), np.arange(len(faces))
-    margin = 1e-9 * max(np.abs(vertices).max(), 1.0)
+            centres[face, axis] = 0.5 * (lower[face, axis] + upper[face, axis])
+    order, largest = np.arange(len(faces)), 1.0
+    for vertex in range(len(vertices)):
+        for axis in range(3):
+            largest = max(largest, abs(vertices[vertex, axis]))
+    margin = 1e-9 * largest
     leaf_count = (len(faces) + WIDTH - 1) // WIDTH
     most = leaf_count + 1  # a node has at least two children, but for the one above the root
     boxes, leaves = np.empty((most, 6, WIDTH), dtype=np.float64), np.zeros((leaf_count, 9, WIDTH), dtype=np.float64)
@@ -146,7 +151,9 @@ def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntAr
     while node < node_count:
         cuts[0], cuts[1] = spans[node, 0], spans[node, 1]
         parts = cut(centres, order, cuts) if node > 0 else 1
-        boxes[node] = np.nan
+        for side in range(6):
+            for lane in range(WIDTH):
+                boxes[node, side, lane] = np.nan
         for lane in range(parts):
             within = order[cuts[lane] : cuts[lane + 1]]
             write_box(boxes[node], lane, lower, upper, within, margin)

@@ -111,7 +111,8 @@ def _spread_rows(
         closest = _closeness_row(columns[y - bottom], closeness, first)
         if TOP - closest > radius * radius:
             continue  # no seed within the radius of this row
-        nearest[:] = closeness[radius : radius + x1 - x0]
+        for x in range(np.uint64(nearest.size)):  # a slice is longer to compile, see ``compiled``
+            nearest[x] = closeness[x + np.uint64(radius)]
         for dx in range(1, radius + 1):
             _raise_row(nearest, closeness, np.uint64(radius - dx), np.uint64(radius + dx), np.uint16(dx * dx))
         _look_up(nearest, cost_of_closeness, costs)

@@ -38,9 +38,14 @@ def rasterise_polygon(corners: FloatArray, box: tuple[int, int, int, int]) -> tu
     mask : (rows, columns) uint8
         1 where the cell (x0 + column, y0 + row) is covered.
     """
-    x0, y0 = max(box[0], int(np.floor(corners[:, 0].min()))), max(box[1], int(np.floor(corners[:, 1].min())))
-    columns = max(0, min(box[2], int(np.floor(corners[:, 0].max())) + 1) - x0)
-    rows = max(0, min(box[3], int(np.floor(corners[:, 1].max())) + 1) - y0)
+    left, low = corners[0, 0], corners[0, 1]
+    right, high = left, low
+    for i in range(1, len(corners)):
+        left, right = min(left, corners[i, 0]), max(right, corners[i, 0])
+        low, high = min(low, corners[i, 1]), max(high, corners[i, 1])
+    x0, y0 = max(box[0], int(np.floor(left))), max(box[1], int(np.floor(low)))
+    columns = max(0, min(box[2], int(np.floor(right)) + 1) - x0)
+    rows = max(0, min(box[3], int(np.floor(high)) + 1) - y0)
     mask = np.zeros((rows, columns), dtype=np.uint8)
     parity = np.zeros((rows, columns + 1), dtype=np.uint8)
     for i in range(len(corners)):

@@ -31,17 +31,24 @@ def bucket_width(table: NDArray[np.float32], steps: float) -> np.float32:
     A step costs 1 or more, so at width 1 no cell falls back into the bucket it is reached from unless a heuristic
     takes the step's cost away again. Wider buckets, which only large costs need, stay exact but relax cells twice.
     """
-    heaviest = table[table < INF].max()
-    return np.float32(max(1.0, steps * SQRT2 * heaviest / (RING - 3)))
+    heaviest = np.float32(0.0)
+    for weight in table:
+        if heaviest < weight < INF:
+            heaviest = weight
+    return np.float32(max(1.0, float(steps * SQRT2 * heaviest / (RING - 3))))
 
 
 @kernel
 def enlarged_if_full(buckets: NDArray[np.int32], counts: NDArray[np.int64], added: Integer) -> NDArray[np.int32]:
     """Buckets (RING, capacity) that hold ``added`` more each; the given array where that does already."""
-    needed = counts.max() + added
+    fullest = counts[0]
+    for slot in range(1, RING):
+        fullest = max(fullest, counts[slot])
+    needed = fullest + added
     if needed <= buckets.shape[1]:
         return buckets
     larger = np.empty((RING, 2 * needed), dtype=np.int32)
     for slot in range(RING):
-        larger[slot, : counts[slot]] = buckets[slot, : counts[slot]]
+        for place in range(counts[slot]):
+            larger[slot, place] = buckets[slot, place]
     return larger

@@ -179,10 +179,10 @@ def _plane(
     surface: Surface, chassis: Chassis, scratch: Scratch, moment: float, x: float, y: float
 ) -> tuple[float, float, float, float]:
     """Height of the middle of the wheels, slopes forward and to the left, and the greatest share of a slope's limit."""
-    front_left = _height(surface, scratch, 0, moment, x, y)
-    rear_left = _height(surface, scratch, 1, moment, x, y)
-    rear_right = _height(surface, scratch, 2, moment, x, y)
-    front_right = _height(surface, scratch, 3, moment, x, y)
+    front_left = _height(surface, scratch, Count(0), moment, x, y)
+    rear_left = _height(surface, scratch, Count(1), moment, x, y)
+    rear_right = _height(surface, scratch, Count(2), moment, x, y)
+    front_right = _height(surface, scratch, Count(3), moment, x, y)
     left, right = (front_left - rear_left) / chassis.wheelbase, (front_right - rear_right) / chassis.wheelbase
     front, rear = (front_left - front_right) / chassis.track, (rear_left - rear_right) / chassis.track
     forward, leftward = 0.5 * (left + right), 0.5 * (front + rear)

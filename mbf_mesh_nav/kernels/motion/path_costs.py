@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Count, kernel
+from mbf_mesh_nav.kernels.compiled import Count, Index, kernel
 from mbf_mesh_nav.kernels.mesh.vectors import between, cross, difference, dot, norm, row, triangle
 
 _LEAST_WEIGHT = 1e-9  # of the corners with a finite cost, lest a cost is divided by zero
@@ -28,7 +28,7 @@ def way_cost(
         if factor == 0.0:
             total += length
             continue
-        a, b, c = triangle(vertices, faces, face)
+        a, b, c = triangle(vertices, faces, Index(face))
         ab, ac, offset = difference(b, a), difference(c, a), difference(between(start, end, 0.5), a)
         normal = cross(ab, ac)
         squared = dot(normal, normal)
