@@ -66,6 +66,7 @@ class ControllerExecution:
         self.last_result: ControlResult | None = None
         self._motion = MotionWatch(run.runtime)
         self._graceful_stop: Stopwatch | None = None
+        self._drove_back = False
         self._lease: Lease | None = None
         self.state = ControllerState.INITIALIZED
 
@@ -132,7 +133,7 @@ class ControllerExecution:
         if problem := self._map_problem():
             return self._hold(lease, ExePathOutcome.MAP_ERROR, problem)
         velocity = measured or Twist()
-        if self._is_arrived(pose):
+        if self._is_arrived(pose, velocity):
             return self._come_to_rest(velocity, lease)
         end = self._watch_motion(pose, measured)
         if end is not None:
@@ -158,6 +159,7 @@ class ControllerExecution:
             return self._end(ControllerState.INVALID_PLAN, ExePathOutcome.INVALID_PATH, text)
         self._plan = plan
         self._graceful_stop = None
+        self._drove_back = False
         if self.state is ControllerState.STOPPING:
             self._enter(ControllerState.STARTED)
         return None
@@ -204,11 +206,16 @@ class ControllerExecution:
         self._enter(ControllerState.HOLDING)
         return self._end(ControllerState.PAT_EXCEEDED, outcome, reason) if self._run.is_patience_over() else None
 
-    def _is_arrived(self, pose: Pose) -> bool:
-        """Ask once; a robot that has arrived and coasts out of the tolerance while it stops has still arrived."""
+    def _is_arrived(self, pose: Pose, velocity: Twist) -> bool:
+        """Ask while the robot drives, and once more when it stands.
+
+        One that coasted out of the tolerance while it stopped is driven back in, once: it could coast out for ever.
+        """
         assert self._plan is not None
         if self.state is ControllerState.STOPPING:
-            return True
+            if self._drove_back or not self._stands(velocity):
+                return True
+            self._drove_back = True
         slack = self._runtime.relaxation.slack(self._runtime.clock.now())
         arrival, is_goal_reached = self._plan.arrival.relaxed(slack), self._controller.is_goal_reached
         self._plan.tracker.update(pose.position)
@@ -220,9 +227,7 @@ class ControllerExecution:
 
     def _come_to_rest(self, velocity: Twist, lease: Lease) -> ControllerEnd | None:
         """At the goal: with ``force_stop_at_goal`` the goal succeeds once the robot stands, else at once."""
-        parameters = self._runtime.parameters
-        limit = parameters.goal_max_speed
-        if not parameters.force_stop_at_goal or velocity.is_stopped(limit, limit):
+        if not self._runtime.parameters.force_stop_at_goal or self._stands(velocity):
             return self._end(ControllerState.ARRIVED_GOAL, ExePathOutcome.SUCCESS, "goal reached")
         if self.state is not ControllerState.STOPPING:
             self._run.patience_watch.restart()
@@ -232,6 +237,10 @@ class ControllerExecution:
             text = f"the robot is at its goal but still moves at {velocity.speed:.2f} m/s, {velocity.wz:.2f} rad/s"
             return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, text)
         return None
+
+    def _stands(self, velocity: Twist) -> bool:
+        limit = self._runtime.parameters.goal_max_speed
+        return velocity.is_stopped(limit, limit)
 
     def _compute(self, pose: Pose, measured: Twist | None) -> ControlResult:
         self._enter(ControllerState.CONTROLLING)

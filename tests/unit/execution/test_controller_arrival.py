@@ -9,6 +9,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.arrival import ArrivalCheck
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.goals.goal_area import DiscArea, PoseSetArea
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome as Outcome
@@ -40,6 +41,40 @@ def test_with_force_stop_the_goal_succeeds_only_when_the_robot_stands(make_sessi
     session.controller.play(drive(0.5))
     assert session.navigator.exe_path(session.path_to(1.0), dist_tolerance=0.3).success
     assert states(session, "controller_execution")[-2:] == ["stopping", "arrived_goal"]
+
+
+def _sliding_back(session, distances):
+    """Odometry of a robot on ice: each time it is stopped it slides back for 0.5 s, by the next of ``distances``."""
+    slides, robot, real = iter(distances), session.robot, session.robot.odometry
+    stopped_at, slid = None, 0.0
+
+    def odometry():
+        nonlocal stopped_at, slid
+        if not robot.command.is_stopped():
+            stopped_at = None
+        elif robot.commands and stopped_at is None:
+            stopped_at, slid = session.clock.now(), slid + next(slides, 0.0)
+            robot.T_map_odom = Transform((-slid, 0.0, 0.0), parent="map", child="odom")
+        if stopped_at is not None and session.clock.now() - stopped_at < 0.5:
+            return Odometry(Twist.planar(-0.3), session.clock.now())
+        return real()
+
+    return odometry
+
+
+@pytest.mark.parametrize(
+    ("slides", "times_stopped", "ends_inside"), [([], 1, True), ([0.1], 2, True), ([0.1] * 9, 2, False)]
+)
+def test_a_robot_that_slides_out_of_the_tolerance_while_it_stops_is_driven_back_in_once(
+    make_session, states, slides, times_stopped, ends_inside
+):
+    session = make_session(force_stop_at_goal=True, mbf_tolerance_exclusive=True)
+    session.robot.odometry = _sliding_back(session, slides)
+    session.controller.play(drive(0.2))
+    result = session.navigator.exe_path(session.path_to(1.0), dist_tolerance=0.3)
+    assert result.success
+    assert states(session, "controller_execution").count("stopping") == times_stopped
+    assert (abs(session.robot.pose.x - 1.0) < 0.3) is ends_inside
 
 
 def test_a_robot_that_does_not_come_to_rest_at_its_goal_is_no_success(make_session):
