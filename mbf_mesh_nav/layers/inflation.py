@@ -20,7 +20,7 @@ from pydantic import model_validator
 from mbf_abstract.maps.layers.inflation import InflationRadii
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import IntArray
-from mbf_mesh_nav.kernels.layers.inflation import repair_distances, set_fading_costs
+from mbf_mesh_nav.kernels.layers.inflation import repair_distances, set_fading_costs, update_sources
 from mbf_mesh_nav.map.layer import CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
 from mbf_mesh_nav.map.layer_graph import union_of
 
@@ -81,15 +81,14 @@ class InflationLayer(MeshLayer):
         """Distances from scratch, costs from distances, lethal as the input."""
         self._drop_all()
         costs, source = np.zeros(self.topology.vertex_count, dtype=np.float32), self.inputs[0]
-        is_source = source.lethal | (source.costs >= self.parameters.source_cost)
-        self._repair(np.flatnonzero(is_source).astype(np.int32), costs)
+        self._is_source = source.lethal | (source.costs >= self.parameters.source_cost)
+        self._repair(np.flatnonzero(self._is_source).astype(np.int32), costs)
         return costs, source.lethal.copy()
 
     def update_from_inputs(self, changed: IntArray) -> IntArray:
         """Repair the distances around the vertices that became sources or ceased to be, and the costs."""
-        now = self.inputs[0].lethal[changed]
-        flipped = changed[self._lethal[changed] != now]
-        self._lethal[changed] = now
+        source, source_cost = self.inputs[0], np.float32(self.parameters.source_cost)
+        flipped = update_sources(source.lethal, source.costs, source_cost, changed, self._lethal, self._is_source)
         return union_of([np.sort(self._repair(changed, self._costs)), flipped])
 
     def _drop_all(self) -> None:
@@ -101,8 +100,7 @@ class InflationLayer(MeshLayer):
 
     def _repair(self, changed: IntArray, costs: CostArray) -> IntArray:
         """Bring distances and costs up to date in place; a vertex that became a source has changed at any cost."""
-        settings, source = self.parameters, self.inputs[0]
-        self._is_source[changed] = source.lethal[changed] | (source.costs[changed] >= settings.source_cost)
+        settings = self.parameters
         touched, flips = repair_distances(
             self.topology.surface,
             settings.inflation_radius,

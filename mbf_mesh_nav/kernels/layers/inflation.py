@@ -76,6 +76,44 @@ def face_offer(vertices: FloatArray, vertex: int, v1: int, d1: float, v2: int, d
 
 
 @kernel
+def update_sources(
+    lethal: BoolArray,
+    costs: Float32Array,
+    source_cost: np.float32,
+    changed: IntArray,
+    known_lethal: BoolArray,
+    is_source: BoolArray,
+) -> IntArray:
+    """Bring the flags of changed vertices up to date: lethal as the input, a source if lethal or costly.
+
+    Parameters
+    ----------
+    lethal, costs : (V,) bool, (V,) float32
+        Of the input.
+    source_cost : np.float32
+        Cost from which a vertex is a source.
+    changed : (c,) int32
+    known_lethal, is_source : (V,) bool
+        Changed in place.
+
+    Returns
+    -------
+    (k,) int32
+        Vertices whose lethal flag changed, but not whether they are a source; in the order of ``changed``.
+    """
+    flipped = np.empty(len(changed), dtype=np.int32)
+    size = Index(0)
+    for changed_vertex in changed:
+        vertex = Index(changed_vertex)
+        source_now = lethal[vertex] or costs[vertex] >= source_cost
+        if lethal[vertex] != known_lethal[vertex] and source_now == is_source[vertex]:
+            flipped[size] = vertex
+            size += ONE
+        known_lethal[vertex], is_source[vertex] = lethal[vertex], source_now
+    return flipped[:size].copy()
+
+
+@kernel
 def repair_distances(
     surface: Surface,
     radius: float,

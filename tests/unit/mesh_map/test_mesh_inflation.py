@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.kernels.layers.inflation import front_arrival
+from mbf_mesh_nav.kernels.layers.inflation import front_arrival, update_sources
 from mbf_mesh_nav.layers.inflation import InflationLayer, InflationParameters
 from mbf_mesh_nav.layers.keepout import KeepoutLayer, KeepoutParameters
 from mbf_mesh_nav.map.layer import LayerContext
@@ -226,3 +226,19 @@ def test_what_costs_enough_is_inflated_like_what_is_lethal_and_does_not_become_s
     anew, lethal = inflation.compute()
     np.testing.assert_array_equal(anew, all_lethal.costs)
     np.testing.assert_array_equal(lethal, source.lethal)
+
+
+def test_sources_follow_the_flags_and_costs_of_changed_vertices_only():
+    rng = np.random.default_rng(5)
+    lethal, known_lethal, is_source = rng.random((3, 400)) < 0.5
+    costs = rng.choice(np.array([0.0, 0.7, np.inf, np.nan], dtype=np.float32), 400)
+    changed = np.sort(rng.choice(400, 250, replace=False)).astype(np.int32)
+    expected_lethal, expected_source = known_lethal.copy(), is_source.copy()
+    expected_lethal[changed] = lethal[changed]
+    expected_source[changed] = (lethal | (costs >= np.float32(0.7)))[changed]
+    only_flag = (expected_lethal != known_lethal) & (expected_source == is_source)
+    flipped = update_sources(lethal, costs, np.float32(0.7), changed, known_lethal, is_source)
+    assert np.array_equal(flipped, np.flatnonzero(only_flag))
+    assert flipped.dtype == np.int32
+    assert np.array_equal(known_lethal, expected_lethal)
+    assert np.array_equal(is_source, expected_source)
