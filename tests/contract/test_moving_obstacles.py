@@ -29,11 +29,13 @@ def make_map_server(request, backends):
 class Walker:
     """A box that moves at constant velocity, and stops after some time; it does not stop for the robot.
 
-    Where it is ``turns_at`` [m] before or behind the robot along x, it turns and walks to the robot's side.
+    Where it is ``turns_at`` [m] before or behind the robot along x, it turns and walks to the robot's side. Nobody
+    sees it at a y above ``hidden_above`` [m], as behind a corner.
     """
 
-    def __init__(self, rig, x, y, vx, vy, until=math.inf, turns_at=None):
+    def __init__(self, rig, x, y, vx, vy, until=math.inf, turns_at=None, hidden_above=math.inf):
         self.rig, self.x, self.y, self.vx, self.vy, self.until = rig, x, y, vx, vy, until
+        self.hidden_above = hidden_above
         self.turns_at = turns_at
         self.touched_by = ""  # who moved when it first touched the robot: "robot", or "walker" alone
         self._place()
@@ -45,7 +47,8 @@ class Walker:
         self.over = True
 
     def _place(self):
-        self.rig.boxes = [Box(self.x - HALF, self.y - HALF, self.x + HALF, self.y + HALF)]
+        box = Box(self.x - HALF, self.y - HALF, self.x + HALF, self.y + HALF)
+        self.rig.boxes = [] if self.y > self.hidden_above else [box]
 
     def _walk(self):
         clock, began, steps = self.rig.clock, self.rig.clock.now(), 0
@@ -58,7 +61,7 @@ class Walker:
                 self.x, self.y = self.x + self.vx * STEP, self.y + self.vy * STEP
                 self._place()
             pose = self.rig.robot.pose
-            if not self.touched_by and self.rig.boxes[0].gap(pose.x, pose.y) < ROBOT_RADIUS:
+            if not self.touched_by and any(box.gap(pose.x, pose.y) < ROBOT_RADIUS for box in self.rig.boxes):
                 self.touched_by = "walker" if self.rig.robot.command.is_stopped() else "robot"
             steps += 1
             clock.sleep_until(began + steps * STEP)
@@ -152,6 +155,18 @@ def test_the_robot_stands_when_somebody_runs_into_it(make_map_server):
     with site(make_map_server, **PARAMETERS) as made:
         walker, _ = drive(made, (7.5, 4.0), (-0.7, 0.0))
         assert walker.touched_by == "walker"
+
+
+COMES_OUT = {"costmap": (4.6, 7.3, 0.0, -0.6), "mesh": (4.4, 6.2, 0.0, -0.6)}
+
+
+def test_the_robot_stands_before_who_comes_out_from_behind_a_corner(make_map_server):
+    """Somebody seen for the first time has not moved yet; waiting until they have come 0.25 m far is too late."""
+    with site(make_map_server, **PARAMETERS) as made:
+        walker = Walker(made.rig, *COMES_OUT[made.server.backend], hidden_above=4.9)
+        result = made.navigator.exe_path(made.path((2.0, 4.0), (8.0, 4.0)))
+        assert result.success, result.message
+        assert walker.touched_by == "walker"  # who looks at nothing, and runs into it
 
 
 def test_a_robot_whose_turns_cancel_out_does_not_drive_straight_into_somebody(make_map_server):

@@ -65,7 +65,10 @@ class MapLayer(ABC):
         return ()
 
     def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """Those before which the robot stops: also what was cleared, until it is seen again or forgotten."""
+        """Those before which the robot stops: also what was cleared, until it is seen again or forgotten.
+
+        What is new counts as moving as soon as it seems to.
+        """
         return self.tracked_objects(now)
 
     def configuration_warning(self) -> str:

@@ -122,9 +122,9 @@ class MovingObstacles:
             return self._tracker.objects(now)
 
     def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """The tracked objects, and those that were cleared and may still be there."""
+        """Also those that were cleared and may still be there; what is new counts as moving once it seems to move."""
         with self._lock:
-            return self._tracker.objects(now, cleared=True)
+            return self._tracker.objects(now, guarded=True)
 
     def stale_reason(self, now: float, limit: float) -> str:
         """Which sensor is silent for longer than ``limit`` [s], or has sent nothing since a clearing."""
@@ -166,7 +166,7 @@ class TrackingLayer(MapLayer):
         return self._objects.objects(now)
 
     def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """Also those that were cleared and are not seen again yet."""
+        """Also those that were cleared and are not seen again yet; what is new moves once it seems to."""
         return self._objects.guarded_objects(now)
 
 

@@ -183,20 +183,29 @@ class Tracker:
         moving = (states[:, states_of.HAS_MOVED] > 0.0) & (stood <= self.parameters.standing_time)
         return np.asarray(np.isin(numbers, self._numbers[: self._count][moving]))
 
-    def objects(self, now: float, *, cleared: bool = False) -> tuple[TrackedObject, ...]:
+    def objects(self, now: float, *, guarded: bool = False) -> tuple[TrackedObject, ...]:
         """The confirmed objects at ``now`` [s], the ones known for longest first; none that is unseen for too long.
 
-        Those that were cleared and not seen since are left out unless ``cleared`` asks for them, too.
+        ``guarded`` is for who stops before them: those that were cleared and not seen since are among them, and who
+        is seen for less than ``standing_time`` moves if its estimated speed is that of a moving object. Waiting until
+        it has come ``moving_distance`` far would be too late where somebody comes out from behind a corner.
         """
-        shown = self._confirmed() & (cleared | (self._room[:, states_of.CLEARED] == 0.0))
+        shown = self._confirmed() & (guarded | (self._room[:, states_of.CLEARED] == 0.0))
         rows = np.flatnonzero(shown).tolist()
-        alike = (self._object(self._room[row].tolist(), int(self._numbers[row]), now) for row in rows)
+        alike = (self._object(self._room[row].tolist(), int(self._numbers[row]), now, guarded) for row in rows)
         return tuple(known for known in alike if known.unseen <= self.parameters.forget_time)
 
-    def _object(self, state: list[float], number: int, now: float) -> TrackedObject:
+    def _seems_to_move(self, state: list[float], now: float) -> bool:
+        """Whether an object too new to have moved is as fast as those that do."""
+        p = self.parameters
+        speed = math.hypot(state[states_of.VX], state[states_of.VY])
+        return now - state[states_of.FIRST_SEEN] <= p.standing_time and speed * p.standing_time >= p.moving_distance
+
+    def _object(self, state: list[float], number: int, now: float, guarded: bool) -> TrackedObject:
         p, later = self.parameters, max(now - self._time, 0.0)
         stood = max(now - state[states_of.ANCHOR_TIME], 0.0)
         moves = bool(state[states_of.HAS_MOVED]) and stood <= p.standing_time
+        moves = moves or (guarded and self._seems_to_move(state, now))
         motion = Motion.MOVING if moves else Motion.PARKED if stood > p.parked_time else Motion.WAITING
         vx, vy = (state[states_of.VX], state[states_of.VY]) if moves else (0.0, 0.0)
         return TrackedObject(

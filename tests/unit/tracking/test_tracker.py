@@ -303,7 +303,7 @@ def test_who_was_cleared_is_hidden_until_seen_again_and_still_the_same_with_the_
     tracker, now = follow(walk(2.0, 0.0, 0.0, 0.8, 10))
     (before,) = tracker.objects(now)
     tracker.clear()
-    assert tracker.objects(now) == () and tracker.objects(now, cleared=True) == (before,)
+    assert tracker.objects(now) == () and tracker.objects(now, guarded=True) == (before,)
     tracker.insert(disc(2.0, 0.8), SENSOR, now + PERIOD)
     (again,) = tracker.objects(now + PERIOD)
     assert again.number == before.number and again.motion is Motion.MOVING
@@ -317,10 +317,25 @@ def test_who_was_cleared_and_is_not_seen_again_is_forgotten_and_numbers_are_not_
     assert tracker.objects(now) == ()
     for step in range(10, 25):
         tracker.insert(np.zeros((0, 3)), SENSOR, step * PERIOD)
-    assert len(tracker) == 0 and tracker.objects(2.4, cleared=True) == ()
+    assert len(tracker) == 0 and tracker.objects(2.4, guarded=True) == ()
     for step in range(25, 30):
         tracker.insert(disc(2.0, 0.8), SENSOR, step * PERIOD)
     assert [known.number for known in tracker.objects(2.9)] == [2]
+
+
+@pytest.mark.parametrize(("speed", "motion"), [(0.5, Motion.MOVING), (0.0, Motion.WAITING)])
+def test_who_is_new_and_fast_moves_for_the_guard_before_it_has_come_far(speed, motion):
+    """Coming out from behind a corner; all others wait until it has moved, as what is new may be part of a wall."""
+    tracker, now = follow(walk(2.0, 0.0, 0.0, -speed, 5))
+    (known,), (guarded,) = tracker.objects(now), tracker.objects(now, guarded=True)
+    assert known.motion is Motion.WAITING and guarded.motion is motion
+    assert guarded.vy == pytest.approx(-speed, abs=0.2)
+
+
+def test_who_has_been_seen_for_long_and_not_moved_stands_for_the_guard_too():
+    tracker, now = follow([(2.0, 0.0)] * 17 + [(2.0, -0.1), (2.0, -0.2)])
+    (guarded,) = tracker.objects(now, guarded=True)
+    assert guarded.motion is Motion.WAITING
 
 
 @given(st.integers(0, 2**32 - 1))
