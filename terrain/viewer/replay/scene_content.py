@@ -126,7 +126,7 @@ def _route(world: Recording, mesh: WorldMesh) -> dict[str, Any]:
     along = ends[-1, :2] - ends[0, :2]
     middle, length = (lower + upper) / 2.0 - mesh.origin, float(np.linalg.norm(upper - lower))
     yaw = float(np.arctan2(-along[0], along[1])) if along.any() else -np.pi / 2.0
-    route = {"middle": middle.tolist(), "length": length, "yaw": yaw}
+    route = {"middle": middle.tolist(), "yaw": yaw}
     box = {"middle": (0.5 * mesh.size).tolist(), "size": mesh.size.tolist()}
     return {"route": route, "box": box, "ring": max(0.4, 0.008 * length)}
 

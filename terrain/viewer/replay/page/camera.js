@@ -3,11 +3,18 @@ const FIELD_OF_VIEW = 0.8;  // rad, vertical
 const BLEND = 0.7;  // s from one view to the next
 const FOLLOW = {pitch: 0.5, lengths: 9, least: 4.5};  // m, and robot's lengths, behind the robot
 const TURNING = 2.5;  // 1/s; how fast the camera follows the heading
+const MARGIN = 44;  // pixels between the edge of the window and what a view is of, for labels
+const LEAST_SEEN = 1.0;  // m around each point
+const ROUTE_POINTS = 200;
+const MUCH_FARTHER = 1.7;  // the overview is of all of the world where it is not this much farther away than the route
+const MUCH_NEARER = 0.8;
 
 class Camera {
-  constructor(canvas, scene, onChange) {
+  constructor(canvas, scene, bodies, onChange) {
     this.canvas = canvas;
     this.scene = scene;
+    this.route = routePoints(scene, bodies);
+    this.corners = cornersOf(scene.box);
     this.onChange = onChange;
     this.fov = FIELD_OF_VIEW;
     this.blend = 0;
@@ -27,15 +34,38 @@ class Camera {
     this.from = {...this.shown};
     this.blend = BLEND;
     this.side = {yaw: 0, pitch: 0, zoom: 1};
-    const {route, size, box} = this.scene, wide = this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1);
-    const fit = 0.5 / Math.tan(this.fov / 2);
-    if (view === 'overview')
-      this.wanted = {target: route.middle, yaw: route.yaw, pitch: 0.75,
-        distance: fit * Math.max(1.25 * route.length / wide, 0.95 * route.length, 6)};
-    if (view === 'above')
-      this.wanted = {target: box.middle, yaw: -Math.PI / 2, pitch: Math.PI / 2 - 0.001,
-        distance: 1.08 * fit * Math.max(box.size[0] / wide, box.size[1]) + size[2]};
+    if (view === 'overview') {
+      const {yaw} = this.scene.route, near = this.turned(this.route, yaw, 0.75), all = this.turned(this.corners, yaw, 0.75);
+      this.wanted = all.distance < MUCH_FARTHER * near.distance ? all : near;
+    }
+    if (view === 'above') this.wanted = this.turned(this.corners, -Math.PI / 2, Math.PI / 2 - 0.001);
     this.onChange();
+  }
+
+  // The view of points from this side or, where it is from much nearer, as on an upright phone, a quarter turn on.
+  turned(points, yaw, pitch) {
+    const [straight, across] = [yaw, yaw - Math.PI / 2].map(angle => this.fitted(points, angle, pitch));
+    return across.distance < MUCH_NEARER * straight.distance ? across : straight;
+  }
+
+  // The nearest view in this direction in which all points are inside the margins of the window.
+  fitted(points, yaw, pitch) {
+    const flat = Math.cos(pitch), ahead = [-flat * Math.cos(yaw), -flat * Math.sin(yaw), -Math.sin(pitch)];
+    const right = [-Math.sin(yaw), Math.cos(yaw), 0], top = cross(right, ahead);
+    const sides = [[right, this.canvas.clientWidth], [top, this.canvas.clientHeight]].map(([axis, pixels]) => {
+      const slope = Math.max(0.5 * pixels - MARGIN, 0.25 * pixels, 1) / Math.max(this.focal, 1);
+      let most = -Infinity, least = Infinity;  // of where the edges of the picture may be
+      for (const point of points) {
+        const to = minus(point, points[0]);
+        most = Math.max(most, dot(to, axis) - slope * dot(to, ahead) + LEAST_SEEN);
+        least = Math.min(least, dot(to, axis) + slope * dot(to, ahead) - LEAST_SEEN);
+      }
+      return {axis, shift: 0.5 * (most + least), distance: 0.5 * (most - least) / slope};
+    });
+    const depths = points.map(point => dot(minus(point, points[0]), ahead));
+    const depth = 0.5 * (Math.max(...depths) + Math.min(...depths));  // the view turns about the middle of what is seen
+    const target = sides.reduce((place, {axis, shift}) => plus(place, axis, shift), plus(points[0], ahead, depth));
+    return {target, yaw, pitch, distance: depth + Math.max(...sides.map(side => side.distance))};
   }
 
   follow(body, seconds) {
@@ -141,4 +171,16 @@ class Camera {
       this.zoom(Math.exp(0.0012 * clamped(event.deltaY, -200, 200)));
     }, {passive: false});
   }
+}
+
+const cornersOf = ({middle, size}) => [0, 1, 2, 3, 4, 5, 6, 7].map(corner =>
+  middle.map((value, k) => value + (corner >> k & 1 ? 0.5 : -0.5) * size[k]));
+
+// Start, goals, and places on the tracks of all robots.
+function routePoints(scene, bodies) {
+  const points = scene.marks.map(mark => mark.position);
+  for (const {positions} of bodies.robots)
+    for (let k = 0, step = 3 * Math.ceil(positions.length / 3 / ROUTE_POINTS); k < positions.length; k += step)
+      points.push([...positions.subarray(k, k + 3)]);
+  return points;
 }

@@ -1,29 +1,45 @@
 // Names of start, goals and robots: chips of one size on the screen, with a stick that ends where they belong.
+const STICK = 16;  // pixels; longer where another chip would be covered
+const GAP = 2;  // pixels between two chips
+
 class Labels {
   constructor(place, marks, robots) {
     this.place = place;
     this.pins = [...marks.map(mark => ({...mark, at: () => mark.position})),
       ...(robots.length > 1 ? robots : []).map(robot => ({name: robot.name, colour: robot.ring, at: () => robot.at && plus(robot.at,
-        [0, 0, robot.height * robot.scale])}))].map(pin => ({...pin, element: this.chip(pin)}));
+        [0, 0, robot.height * robot.scale])}))].map(pin => ({...pin, ...this.chip(pin)}));
   }
 
   chip({name, colour}) {
-    const pin = document.createElement('div'), text = document.createElement('b'), stick = document.createElement('i');
-    pin.className = 'pin';
+    const element = document.createElement('div'), text = document.createElement('b'), stick = document.createElement('i');
+    element.className = 'pin';
     text.textContent = name;
     text.style.background = stick.style.background = `rgb(${colour})`;
-    pin.append(text, stick);
-    this.place.append(pin);
-    return pin;
+    element.append(text, stick);
+    this.place.append(element);
+    return {element, stick, wide: text.offsetWidth, tall: text.offsetHeight};
   }
 
   show(camera, cut) {
+    const shown = [];
     for (const pin of this.pins) {
       const at = pin.at(), place = at && camera.project(at);
       pin.element.hidden = !place;
       if (!place) continue;
+      const raised = this.raised(pin, place, shown);
+      pin.stick.style.height = raised + 'px';
       pin.element.style.transform = `translate(${Math.round(place[0])}px, ${Math.round(place[1])}px) translate(-50%, -100%)`;
       pin.element.style.opacity = at[2] > cut ? 0.45 : 1;
+      shown.push({x: place[0], y: place[1] - raised, wide: pin.wide, tall: pin.tall});
     }
+  }
+
+  // Length of the stick with which a chip covers none of those that are shown.
+  raised(pin, [x, y], shown) {
+    let length = STICK;
+    const covered = () => shown.find(other => Math.abs(other.x - x) < 0.5 * (other.wide + pin.wide) + GAP &&
+      y - length > other.y - other.tall - GAP && y - length - pin.tall - GAP < other.y);
+    for (let other = covered(); other; other = covered()) length = Math.ceil(y - other.y + other.tall + GAP) + 1;
+    return length;
   }
 }

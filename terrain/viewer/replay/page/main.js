@@ -16,7 +16,7 @@ class Replay {
     this.bodies = new Bodies(this.drawing, scene, arrays);
     this.lines = new Lines(this.drawing, scene, arrays, this.bodies.times);
     this.labels = new Labels(document.getElementById('labels'), scene.marks, this.bodies.robots);
-    this.camera = new Camera(this.canvas, scene, changed);
+    this.camera = new Camera(this.canvas, scene, this.bodies, changed);
     this.sky = this.drawing.program(SKY_VERTEX, SKY_FRAGMENT);
     this.empty = this.drawing.gl.createVertexArray();
     this.chosen = 0;
@@ -115,7 +115,7 @@ class Replay {
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map(side => Math.round(side * ratio));
     if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, {width, height});
     drawing.begin();
-    bodies.place(player.time, camera);
+    bodies.place(player.time, camera, this.robot);
     if (this.robot) camera.follow(this.robot, player.jumped ? Infinity : seconds * Number(player.speeds.value));
     player.jumped = false;
     this.dirty = camera.advance(seconds);
@@ -132,6 +132,7 @@ class Replay {
     this.drawSky(width / height);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    bodies.drawHidden(common);
     bodies.draw(common, this.marks());
     this.lines.draw(common, player.time, camera);
     this.labels.show(camera, cut);
@@ -156,14 +157,15 @@ class Replay {
 
   showText() {
     const {player, camera} = this, robot = this.robot, last = player.end > 0 && player.time >= player.end;
-    let text = '';
+    const text = [];
     if (robot && robot.at) {
       const speed = robot.speeds[this.bodies.frame] / 1000, tilt = robot.tilts[this.bodies.frame] / 1000;
-      text = `${robot.name ? robot.name + '   ' : ''}${speed.toFixed(1)} m/s   tilt ${tilt.toFixed(0)}°`;
-      if (last) text += '   ' + this.scene.ending;
-      if (robot.scale > 1.05) text += `\nrobot drawn ${robot.scale.toFixed(1)} × its size`;
+      if (robot.name) text.push(robot.name);
+      text.push(`${speed.toFixed(1)} m/s`, `tilt ${tilt.toFixed(0)}°`);
+      if (robot.scale > 1.05) text.push(`robot drawn ${robot.scale.toFixed(1)} × its size`);
+      if (last) text.push(this.scene.ending);
     }
-    document.getElementById('status').textContent = text;
+    document.getElementById('status').textContent = text.join(' · ');
     document.querySelectorAll('#views button').forEach(button =>
       button.setAttribute('aria-pressed', String(button.dataset.view === camera.view)));
     this.panel.show(Math.round(10 * player.time) / 10);

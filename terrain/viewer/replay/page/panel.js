@@ -13,9 +13,16 @@ class Panel {
   }
 
   showLines(time) {
-    const past = this.run.lines.filter(line => line[0] <= time), place = document.getElementById('run-lines');
-    const shown = past.slice(-this.run.shown).reverse();
-    place.replaceChildren(...shown.map(([at, text, colour]) => lineOf(at.toFixed(1) + ' s  ' + text, 'color:' + colour)));
+    const shown = [];  // the newest first; of the same that happens again and again the newest, with how often it has
+    const past = this.run.lines.filter(line => line[0] <= time).reverse();
+    for (const [at, text, colour] of past) {
+      const same = text.split(':')[0], before = shown[shown.length - 1];
+      if (before && before.same === same) before.times += 1;
+      else if (shown.length === this.run.shown) break;
+      else shown.push({at, text, colour, same, times: 1});
+    }
+    document.getElementById('run-lines').replaceChildren(...shown.map(({at, text, colour, times}) =>
+      lineOf(`${at.toFixed(1)} s  ${text}${times > 1 ? `  (${times} times)` : ''}`, 'color:' + colour)));
   }
 
   showTree(time) {
@@ -52,8 +59,9 @@ class Panel {
   }
 }
 
+// A number and its unit stay on one line.
 function lineOf(text, style) {
   const line = document.createElement('div');
-  line.textContent = text; line.style.cssText = style;
+  line.textContent = text.replace(/(\d) (?=[a-z°%])/g, '$1\u00a0'); line.style.cssText = style;
   return line;
 }

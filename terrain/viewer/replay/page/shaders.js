@@ -83,15 +83,18 @@ const BODY_VERTEX = `#version 300 es
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 paint;
 uniform mat4 view;
+uniform vec3 eye;
+uniform float nearer;
 out vec3 at;
-out vec3 shade;
-void main() { at = position; shade = paint.rgb; gl_Position = view * vec4(at, 1.0); }`;
+out vec4 shade;
+void main() { at = position; shade = paint; gl_Position = view * vec4(at + nearer * normalize(eye - at), 1.0); }`;
 
 const BODY_FRAGMENT = LIT + `
+uniform float share;
 in vec3 at;
-in vec3 shade;
+in vec4 shade;
 out vec4 colour;
-void main() { if (at.z > cut) discard; colour = vec4(lit(shade, at, faceNormal(at)), 1.0); }`;
+void main() { if (at.z > cut) discard; colour = vec4(lit(shade.rgb, at, faceNormal(at)), share * shade.a); }`;
 
 // Discs on the ground: contact shade (solid 0), rings around robots and goals (solid 1).
 const DISC_VERTEX = `#version 300 es
