@@ -185,7 +185,7 @@ def test_a_frame_of_three_hundred_thousand_triangles_stays_within_its_budget(chr
 
     assert errors == []
     assert near["triangles"] > 300_000
-    assert near["drawCalls"] <= 13, "shadows, world, sky, hidden robot, discs, bodies, three for each of two lines, scan"
+    assert near["drawCalls"] <= 13, "shadows, world, sky, hidden robot, discs, bodies, 3 for each of 2 lines, scan"
     assert near["bytes"] < 40e6, "shadows 17 MB; 12 bytes a vertex, 12 a triangle"
     assert far["triangles"] < near["triangles"] / 20, "a coarser level of detail is drawn from afar"
     assert far["drawCalls"] <= near["drawCalls"]
