@@ -56,7 +56,7 @@ class HierarchicalParameters(PluginParameters):
     repair: bool = parameter(
         False,
         "Keep the distances to the last goal and repair them where sensed costs have changed: for plans at a rate to "
-        "one goal without via points. The first plan takes longer, a loaded vertex 8 bytes more.",
+        "one goal without via points. The first plan takes longer; of the memory a loaded vertex takes 8 bytes more.",
     )
 
 
@@ -72,7 +72,15 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
             raise ValueError("plans on a map of tiles, which the configuration's backend does not have")
         self._map = context.navigation_map
         self._tiled = context.navigation_map.tiled
-        self._last = CorridorField(self._tiled)
+        self._last: CorridorField | None = None
+        if self.parameters.repair:
+            with self._map.turn_to_search():
+                self._last = CorridorField(self._tiled)
+
+    def parameters_changed(self) -> None:
+        """Without ``repair`` no distances are kept; their share of the memory stays reserved."""
+        if self._last is not None and not self.parameters.repair:
+            self._last.forget()
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Plan from start over the via points to the goal; see ``AbstractPlanner``. A damaged tile is a MAP_ERROR."""
@@ -151,6 +159,7 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         """Plan a leg, by repair of the last plan if that is kept."""
         tolerance = self.parameters.cost_tolerance
         if is_kept:
+            self._last = self._last or CorridorField(self._tiled)
             return self._last.plan(first, last, tolerance, flag)
         return plan_between(self._tiled, first, last, tolerance=tolerance, cancel_flag=flag)
 

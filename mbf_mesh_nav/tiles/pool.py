@@ -26,6 +26,8 @@ VERTEX_BYTES = 24 + 12 + 4 + 1 + 21
 """Of a vertex: position, normal, offset, blocked, and the lists of a search."""
 EDGE_BYTES = 8
 """Of an edge in one direction: neighbour and weight."""
+FIELD_BYTES = 4 + 4
+"""Of a vertex in a field that a planner keeps beside its search: distance and next vertex."""
 MOST_PLACES = 2**31 - 1
 """Vertices and edges of all slots: what int32 can number."""
 
@@ -38,7 +40,9 @@ class TilePool:
     entries : iterable of TileEntry
         All tiles of the map.
     memory : float
-        Bytes that the slots may take, those of a search included.
+        Bytes that the slots may take, those of a search and of the fields included.
+    fields : int
+        How many fields of distances over all slots planners keep.
 
     Attributes
     ----------
@@ -46,11 +50,12 @@ class TilePool:
         Number of tiles that fit; their vertices and edges are numbered by int32, however much memory there is.
     """
 
-    def __init__(self, entries: Iterable[TileEntry], memory: float) -> None:
+    def __init__(self, entries: Iterable[TileEntry], memory: float, fields: int = 0) -> None:
         # One vertex more ends the last row of a tile.
         sizes = [(one.core_vertices + 1, one.neighbours + one.shared) for one in entries]
         self._vertices_of_slot, self._edges_of_slot = (max(column) for column in zip(*sizes, strict=True))
-        self.slot_bytes = VERTEX_BYTES * self._vertices_of_slot + EDGE_BYTES * self._edges_of_slot
+        vertex_bytes = VERTEX_BYTES + fields * FIELD_BYTES
+        self.slot_bytes = vertex_bytes * self._vertices_of_slot + EDGE_BYTES * self._edges_of_slot
         most = MOST_PLACES // max(self._vertices_of_slot, self._edges_of_slot)
         self.slots = max(0, min(int(memory // self.slot_bytes), len(sizes), most))
         vertices, edges = self.slots * self._vertices_of_slot, self.slots * self._edges_of_slot

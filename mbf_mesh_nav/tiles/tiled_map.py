@@ -44,7 +44,7 @@ class TiledMap:
     profile : str
         Name of a cost profile; empty = the map's first.
     memory : float
-        Bytes that loaded tiles, searches and the tables of portals may take.
+        Bytes that loaded tiles, searches, kept fields and the tables of portals may take.
 
     Attributes
     ----------
@@ -73,14 +73,9 @@ class TiledMap:
         bounds = {key: self._read_portals(key) for key in self.index.entries}
         self.portals = PortalGraph(bounds)
         self.estimates = PortalGraph({key: self._estimated(one) for key, one in bounds.items()})
-        entries = self.index.entries.values()
-        largest = TilePool(entries, 0.0).slot_bytes
         self.table_bytes = PAIR_BYTES * sum(one.costs.size for one in bounds.values())
-        self.pool = TilePool(entries, memory - self.table_bytes - KEPT_TILES * largest)
-        if self.pool.slots < min(2, len(self.index.tiles)):
-            least = (self.table_bytes + (KEPT_TILES + 2) * largest) / 1e6
-            text = f"its tiles need {least:.3g} MB of memory, allowed are {memory / 1e6:.3g} MB"
-            raise MeshError(str(folder), [text])
+        self._memory, self._fields = memory, 0
+        self.pool = self._empty_pool(self._fields)
         self._kept: OrderedDict[TileKey, tuple[Tile, TileGraph]] = OrderedDict()
         self.changes = 0
         self._sensed = NOTHING_SENSED
@@ -106,6 +101,17 @@ class TiledMap:
                 self._kept.popitem(last=False)
         self._kept.move_to_end(key)
         return self._kept[key]
+
+    def make_room_for_field(self) -> None:
+        """Have the memory hold one field of a planner over all slots, too: there are fewer slots, and all are empty.
+
+        Raises
+        ------
+        MeshError
+            ``memory`` does not hold two tiles with it; nothing has changed then.
+        """
+        self.pool = self._empty_pool(self._fields + 1)
+        self._fields += 1
 
     def hold(self, keys: list[TileKey]) -> None:
         """Load tiles into the pool."""
@@ -201,6 +207,17 @@ class TiledMap:
         if self._raised.pop(key, None) is not None and (raised := self._with_sensed(tile, self._sensed)) is not None:
             self._raised[key] = raised
         self.pool.drop(key)
+
+    def _empty_pool(self, fields: int) -> TilePool:
+        """A pool of what the memory leaves beside the tables, the kept tiles and some fields of planners."""
+        entries = self.index.entries.values()
+        kept = self.table_bytes + KEPT_TILES * TilePool(entries, 0.0).slot_bytes
+        pool = TilePool(entries, self._memory - kept, fields)
+        if pool.slots < min(2, len(self.index.tiles)):
+            least = (kept + 2 * pool.slot_bytes) / 1e6
+            text = f"its tiles need {least:.3g} MB of memory, allowed are {self._memory / 1e6:.3g} MB"
+            raise MeshError(str(self.folder), [text])
+        return pool
 
     def _with_sensed(self, tile: Tile, sensed: SensedCosts) -> tuple[Tile, TileGraph] | None:
         """A tile and its weights with sensed costs; None if none of them is on it."""

@@ -4,9 +4,10 @@ The first plan to a goal is searched (``corridor_search``), and the distances fr
 it looked at are computed. From then on a plan repairs them where sensed costs have changed, as ``mesh.repairing`` does
 on one mesh, and traces the path from where the robot is by then.
 
-What the search has shown of its corridor has to hold still. A plan is searched anew if it leads to another goal, if it
-begins a portal's length or more beside the last path, if a tile has changed or left the memory, if sensed costs have
-changed outside of the corridor, and once changes have made the way longer by more than two corridors may differ by.
+What the search has shown of its corridor has to hold still. A plan is searched anew if it leads to another goal or may
+cost less above the cheapest, if it begins a portal's length or more beside the last path, if a tile has changed or left
+the memory, if sensed costs have changed outside of the corridor, and once changes have made the way longer by more than
+two corridors may differ by, or by more than the tolerance where that is less.
 """
 
 from __future__ import annotations
@@ -33,10 +34,12 @@ from mbf_mesh_nav.tiles.tiled_map import TiledMap
 class _Field:
     """Distances (V,) [m] of the pool's vertices to a goal, the next vertices on the way, and what they are of.
 
-    ``risen`` is by how much changes have made the ways of the plans longer since the search [m].
+    ``risen`` is by how much changes have made the ways of the plans longer since the search [m], ``tolerance`` is that
+    of the search.
     """
 
     goal: TilePlace
+    tolerance: float
     roots: IntArray
     distances: Float32Array
     predecessors: IntArray
@@ -49,25 +52,36 @@ class _Field:
 
 
 class CorridorField:
-    """What is kept of the last goal; takes one thread at a time, as ``tiled`` does."""
+    """What is kept of the last goal; takes one thread at a time, as ``tiled`` does.
+
+    Raises
+    ------
+    MeshError
+        The map's memory does not hold a field beside two tiles.
+    """
 
     def __init__(self, tiled: TiledMap) -> None:
+        tiled.make_room_for_field()
         self._tiled = tiled
         self._field: _Field | None = None
+
+    def forget(self) -> None:
+        """Search the next plan."""
+        self._field = None
 
     def plan(self, start: TilePlace, goal: TilePlace, tolerance: float, cancel_flag: FlagArray) -> TiledPlan:
         """Plan between two places as ``plan_between``, by repair where that is as good."""
         field, self._field = self._field, None  # a cancelled repair leaves no half-finished field behind
-        plan = None if field is None else self._repaired(field, start, goal, cancel_flag)
+        plan = None if field is None else self._repaired(field, start, goal, tolerance, cancel_flag)
         if plan is not None:
             self._field = field
             return plan
         plan = plan_between(self._tiled, start, goal, tolerance=tolerance, cancel_flag=cancel_flag)
         if plan.outcome == GetPathOutcome.SUCCESS and plan.tiles:
-            self._field = self._new(plan, goal, cancel_flag)
+            self._field = self._new(plan, goal, tolerance, cancel_flag)
         return plan
 
-    def _new(self, plan: TiledPlan, goal: TilePlace, cancel_flag: FlagArray) -> _Field | None:
+    def _new(self, plan: TiledPlan, goal: TilePlace, tolerance: float, cancel_flag: FlagArray) -> _Field | None:
         """The field of a plan that was searched just now; None if it is cancelled."""
         self._tiled.hold(list(plan.tiles))  # a wider corridor than that of the plan may have taken their places
         graph, firsts = self._graph(plan.tiles), self._firsts(plan.tiles)
@@ -76,15 +90,19 @@ class CorridorField:
         roots = (goal.corners + firsts[goal.key]).astype(np.int32)
         distances[roots] = goal.corner_costs
         arrays = roots, distances, predecessors, firsts
-        field = _Field(goal, *arrays, self._tiled.sensed, self._tiled.changes, plan.cost, plan)
+        field = _Field(goal, tolerance, *arrays, self._tiled.sensed, self._tiled.changes, plan.cost, plan)
         return field if self._spread(field, graph, roots, cancel_flag) else None
 
-    def _repaired(self, field: _Field, start: TilePlace, goal: TilePlace, cancel_flag: FlagArray) -> TiledPlan | None:
+    def _repaired(
+        self, field: _Field, start: TilePlace, goal: TilePlace, tolerance: float, cancel_flag: FlagArray
+    ) -> TiledPlan | None:
         """The path on the repaired field; None where it has to be searched anew."""
         # 1. Does it lead to the same goal, from beside the last path, over tiles that are as they were?
-        if not self._still_holds(field, start, goal):
+        if tolerance < field.tolerance or not self._still_holds(field, start, goal):
             return None
         tiles, numbers = field.path.tiles, field.sensed.differing(self._tiled.sensed)
+        if len(tiles) > self._tiled.pool.slots:  # another planner's field has taken room since
+            return None
         self._tiled.hold(list(tiles))
         changed = self._tiled.vertices_in_pool(numbers, tiles, (field.sensed.box, self._tiled.sensed.box))
         graph = self._graph(tiles)
@@ -103,7 +121,7 @@ class CorridorField:
         # 3. Has the way become so much longer that another corridor may be better?
         cost = _cost_from(field, start)
         field.risen += max(0.0, cost - before) if np.isfinite(before) else np.inf
-        if not np.isfinite(cost) or field.risen > STEADY * field.searched_cost:
+        if not np.isfinite(cost) or field.risen > min(STEADY, tolerance) * field.searched_cost:
             return None
         field.path = self._traced(field, start, cost, len(numbers))
         return field.path

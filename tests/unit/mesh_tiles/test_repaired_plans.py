@@ -4,6 +4,7 @@ import shutil
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from sensing_tiles import SensingWhole, drive, sensing_map
 from test_tile_server import pose
 
@@ -11,12 +12,13 @@ from mbf_abstract.maps.navigation_map import MapContext
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_abstract.testing.contract.rig import rig
+from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.planners.hierarchical import HierarchicalParameters, HierarchicalPlanner
 from mbf_mesh_nav.tiles.planning import place_on_tiles, plan_between
 from mbf_mesh_nav.tiles.portals import NOT_CANCELLED
 from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED, SensedCosts
 from mbf_mesh_nav.tiles.serving.corridor_field import CorridorField
-from mbf_mesh_nav.tiles.tiled_map import TiledMap
+from mbf_mesh_nav.tiles.tiled_map import KEPT_TILES, TiledMap
 
 
 def places(tiled, *positions):
@@ -35,10 +37,10 @@ def seen_around(tiled, place, reach=0.8):
     return SensedCosts.at(numbers[near], *values, vertices[near])
 
 
-def assert_as_computed_anew(kept, tiled):
+def assert_as_computed_anew(kept):
     """The field is, to the bit, that of the same tiles without a memory."""
     field = kept._field
-    fresh = CorridorField(tiled)._new(field.path, field.goal, NOT_CANCELLED)
+    fresh = kept._new(field.path, field.goal, field.tolerance, NOT_CANCELLED)
     assert np.array_equal(field.distances, fresh.distances)
 
 
@@ -70,7 +72,7 @@ def test_a_repaired_field_is_the_one_that_is_computed_anew(tiled_hills, whole_hi
         tiled.lay_over(NOTHING_SENSED if step % 5 == 4 else seen_around(tiled, seen[rng.integers(len(seen))]))
         plan, exact = kept.plan(start, goal, 0.03, NOT_CANCELLED), plan_between(tiled, start, goal)
         assert exact.cost * (1.0 - 1e-6) <= plan.cost <= 1.03 * exact.cost
-        assert_as_computed_anew(kept, tiled)
+        assert_as_computed_anew(kept)
         repaired += "repaired" in plan.message
     assert 3 <= repaired < 12
 
@@ -118,3 +120,74 @@ def test_a_cancelled_repair_is_forgotten(tiled_hills, way):
     plan = kept.plan(start, goal, 0.03, np.ones(1, dtype=np.uint8))
     assert plan.outcome == GetPathOutcome.CANCELED and kept._field is None
     assert "repaired" not in kept.plan(start, goal, 0.03, NOT_CANCELLED).message
+
+
+def test_a_plan_that_may_cost_less_above_the_cheapest_is_searched_anew(tiled_hills, way):
+    tiled = TiledMap(tiled_hills)
+    kept, (start, goal) = CorridorField(tiled), places(tiled, way[4], way[16])
+
+    def is_repaired(tolerance):
+        return "repaired" in kept.plan(start, goal, tolerance, NOT_CANCELLED).message
+
+    assert not is_repaired(0.03) and is_repaired(0.05) and is_repaired(0.03)
+    assert not is_repaired(0.0) and is_repaired(0.0) and is_repaired(0.03)
+
+
+def test_an_exact_plan_is_searched_anew_once_its_way_has_become_longer(tiled_hills, way):
+    """Without a tolerance there is no room for another corridor, however little is left to win there."""
+    tiled = TiledMap(tiled_hills)
+    kept, (start, goal) = CorridorField(tiled), places(tiled, way[0], way[-1])
+    first = kept.plan(start, goal, 0.0, NOT_CANCELLED)
+    tiled.lay_over(seen_around(tiled, first.positions[10], reach=0.3))
+    plan = kept.plan(start, goal, 0.0, NOT_CANCELLED)
+    assert first.cost < plan.cost < 1.004 * first.cost and "repaired" not in plan.message
+
+
+def room_for(tiled, slots):
+    """Memory [B] that holds some tiles without a field."""
+    return tiled.table_bytes + (KEPT_TILES + slots + 0.5) * tiled.pool.slot_bytes
+
+
+def test_the_memory_holds_fewer_tiles_beside_a_field(tiled_hills):
+    probe = TiledMap(tiled_hills)
+    memory = room_for(probe, 9)
+    tiled = TiledMap(tiled_hills, memory=memory)
+    CorridorField(tiled)
+    kept_and_tables = tiled.table_bytes + KEPT_TILES * probe.pool.slot_bytes
+    assert tiled.pool.slots == int((memory - kept_and_tables) // tiled.pool.slot_bytes) < 9
+    assert tiled.pool.slot_bytes > probe.pool.slot_bytes
+    tight = TiledMap(tiled_hills, memory=room_for(probe, 2) - 0.4 * probe.pool.slot_bytes)
+    pool = tight.pool
+    with pytest.raises(MeshError, match=r"its tiles need .* MB of memory, allowed are"):
+        CorridorField(tight)
+    assert tight.pool is pool
+
+
+def test_a_field_over_more_tiles_than_fit_beside_another_one_is_searched_anew(tiled_hills, way):
+    probe = TiledMap(tiled_hills)
+    for slots in range(4, 12):
+        tiled = TiledMap(tiled_hills, memory=room_for(probe, slots))
+        kept, (start, goal) = CorridorField(tiled), places(tiled, way[0], way[-1])
+        tiles = kept.plan(start, goal, 0.03, NOT_CANCELLED).tiles
+        CorridorField(tiled)
+        if len(tiles) > tiled.pool.slots:
+            break
+    plan = kept.plan(start, goal, 0.03, NOT_CANCELLED)
+    assert len(tiles) > tiled.pool.slots >= len(plan.tiles) and "repaired" not in plan.message
+
+
+def test_a_planner_without_repair_keeps_no_distances(tiled_hills, way):
+    navigation_map = sensing_map(tiled_hills, side=100.0)
+    tiled, request = navigation_map.tiled, PlanRequest(pose(way[4]), pose(way[16]))
+    slot_bytes, make = tiled.pool.slot_bytes, lambda base: MapContext(**vars(base), navigation_map=navigation_map)
+    with rig(HierarchicalPlanner, make, HierarchicalParameters(), pose(way[4])) as made:
+        planner = made.plugin
+        planner.make_plan(request)
+        assert tiled.pool.slot_bytes == slot_bytes
+        planner.parameters = HierarchicalParameters(repair=True)
+        notes = [planner.make_plan(request).message for _ in range(2)]
+        assert ["repaired" in note for note in notes] == [False, True] and tiled.pool.slot_bytes > slot_bytes
+        planner.parameters = HierarchicalParameters()
+        planner.parameters_changed()
+        planner.parameters = HierarchicalParameters(repair=True)
+        assert "repaired" not in planner.make_plan(request).message
