@@ -69,7 +69,7 @@ class PluginAction(Action[G, R, F], Generic[G, R, F, P]):
                 text = f"{job.handle.cancel_reason}; {run.suspect} has not ended yet"
                 job.abandon(self.canceled_outcome, text)
             else:
-                text = f"{run.suspect} gave no answer within {run.patience:g} s and its grace"
+                text = f"{run.suspect} {run.why_given_up}"
                 job.abandon(self.patience_outcome, text)
 
         return PluginRun(self.runtime, plugin, job.handle, lambda: self.patience, end)

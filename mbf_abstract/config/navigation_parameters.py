@@ -160,7 +160,11 @@ class NavigationParameters(ParameterModel):
         1.0, "Time a plugin has to obey a cancel before it is quarantined.", unit="s", ge=0.0, le=60.0
     )
     hang_guard: float = parameter(
-        30.0, "Real time after which a plugin call that stops simulated time counts as hung.", unit="s", gt=0.0
+        30.0,
+        "Real time that a plugin call may take while simulated time stands, until it counts as hung; on Linux without "
+        "the time in which the machine had no processor for it.",
+        unit="s",
+        gt=0.0,
     )
     max_quarantined: int = parameter(
         8, "Hung plugin threads that are tolerated before goals are rejected.", ge=1, le=1000

@@ -107,6 +107,14 @@ class PluginRun(Generic[P]):
         self.runtime.supervisor.poke(self._watch)
 
     @property
+    def why_given_up(self) -> str:
+        """Text on a call that was abandoned without a cancel, without its subject."""
+        if self._hung:
+            limit = self.runtime.parameters.hang_guard
+            return f"took over {limit:g} s of real time while simulated time stood (hang_guard)"
+        return f"gave no answer within {self.patience:g} s and its grace"
+
+    @property
     def canceled(self) -> bool:
         """Whether the client wants the goal to end."""
         return self.handle.cancel_requested
@@ -290,10 +298,13 @@ class PluginRun(Generic[P]):
             self.runtime.hanging.add(self)
         self.patience_exceeded = self.patience_exceeded or not self.canceled
         if self.suspect == self.plugin.title:
-            self.plugin.quarantine(
-                self, "patience exceeded" if self.patience_exceeded else "did not end after a cancel"
-            )
+            self.plugin.quarantine(self, self._quarantine_reason())
         else:
             self.plugin.release(self)
         self._on_abandon(self)
         return None
+
+    def _quarantine_reason(self) -> str:
+        if self._hung:
+            return f"it {self.why_given_up}"
+        return "patience exceeded" if self.patience_exceeded else "did not end after a cancel"

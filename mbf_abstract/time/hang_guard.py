@@ -1,17 +1,18 @@
-"""The wall-clock guard of a simulated run: it detaches a thread that keeps the baton for too long.
+"""The guard of a simulated run: it detaches a thread that keeps the baton for too long.
 
-The only place where a simulated run may depend on the wall clock.
+The only place where a simulated run may depend on the real clock. What counts is the time that the thread took by
+itself (``own_time``), so a run does not depend on what else the machine has to do, only on how fast it is.
 """
 
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from types import TracebackType
 
 from mbf_abstract.compiling.compilation import unwatch_compiler, watch_compiler
 from mbf_abstract.time.clock import ThreadDetached
+from mbf_abstract.time.own_time import OwnTime
 from mbf_abstract.time.participant import GuardedSection, Participant
 from mbf_abstract.time.scheduler import LockstepScheduler
 
@@ -22,12 +23,13 @@ class HangGuard:
     Parameters
     ----------
     limit : float
-        Wall seconds a guarded section may run without waiting; 0 = for ever.
+        Seconds a guarded section may take without waiting on the clock; 0 = any number.
     """
 
     def __init__(self, scheduler: LockstepScheduler, limit: float) -> None:
         self.limit = limit
         self._scheduler = scheduler
+        self._own_time = OwnTime()
         self._alone = threading.Event()
         self._running = False
 
@@ -62,19 +64,22 @@ class HangGuard:
         self._alone.set()
 
     def _watch(self) -> None:
-        while not self._alone.wait(min(1.0, self.limit / 4.0)):
-            for section in self._detach_if_hung():
+        while not self._alone.wait(period := min(1.0, self.limit / 4.0)):
+            for section in self._detach_if_hung(2.0 * period):
                 if section.on_hang is not None:
                     section.on_hang()
 
-    def _detach_if_hung(self) -> tuple[GuardedSection, ...]:
-        """Give up on the running thread if it is due; the sections it hangs in, the outermost first."""
+    def _detach_if_hung(self, longest: float) -> tuple[GuardedSection, ...]:
+        """Give up on the running thread if it is due; the sections it hangs in, the outermost first.
+
+        At most ``longest`` [s] count since the last call.
+        """
         scheduler = self._scheduler
         with scheduler.mutex:
             suspect = scheduler.running
-            if suspect is None or not suspect.sections or suspect is scheduler.founder:
+            if suspect is None or not (suspect.sections and suspect.is_timed) or suspect is scheduler.founder:
                 return ()
-            if time.monotonic() - suspect.resumed_at < self.limit:
+            if self._own_time.look(suspect.native_id, suspect.work, longest) < self.limit:
                 return ()
             suspect.detached = True
             scheduler.known.discard(suspect)

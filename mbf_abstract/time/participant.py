@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import gc
-import math
 import sys
 import threading
-import time
 from collections.abc import Callable
 from pathlib import PurePath
 from types import FrameType
@@ -47,13 +45,13 @@ class Participant:
     """One known (or, while it waits, one foreign) thread."""
 
     __slots__ = (
-        "baton", "deadlock", "detached", "foreign", "held_locks", "ident", "name", "notified", "outside_depth",
-        "priority", "resumed_at", "sections", "ticket", "waiting_among",
+        "baton", "deadlock", "detached", "foreign", "held_locks", "ident", "is_timed", "name", "native_id", "notified",
+        "outside_depth", "priority", "sections", "ticket", "waiting_among", "work",
     )  # fmt: skip
 
     def __init__(self, name: str, priority: int, foreign: bool = False) -> None:
         self.name = name
-        self.ident = threading.get_ident()  # of the thread that makes it; a SimThread sets its own when it starts
+        self.run_on_this_thread()  # the one that makes it; a SimThread does so again when it starts
         self.priority = priority
         self.foreign = foreign
         self.baton = threading.Lock()  # released by whoever passes it on, so it is no lock in the usual sense
@@ -65,8 +63,13 @@ class Participant:
         self.held_locks = 0
         self.outside_depth = 0  # coroutines of this thread that are outside the lockstep
         self.sections: list[GuardedSection] = []  # the guarded ones it is in, the outermost first
-        self.resumed_at = 0.0  # wall clock
+        self.is_timed = False  # whether the hang guard counts
+        self.work = 0  # grows when it begins to count anew
         self.waiting_among: list[Participant] | None = None  # the waiters of the condition it waits on
+
+    def run_on_this_thread(self) -> None:
+        """Be the thread that calls this."""
+        self.ident, self.native_id = threading.get_ident(), threading.get_native_id()
 
     def leave_waiters(self) -> None:
         """Wait on no condition any more; the scheduler's mutex is held."""
@@ -81,8 +84,9 @@ class Participant:
 
     def start_counting(self) -> None:
         """Let the hang guard's time begin anew."""
-        self.resumed_at = time.monotonic()
+        self.work += 1
+        self.is_timed = True
 
     def stop_counting(self) -> None:
-        """Let the hang guard wait: the compiler is at work."""
-        self.resumed_at = math.inf
+        """Let the hang guard wait: the compiler is at work, or it is another thread's turn."""
+        self.is_timed = False

@@ -158,7 +158,7 @@ class LockstepScheduler:
     def enter(self, me: Participant) -> None:
         """Begin the thread of ``me`` and wait for its first turn."""
         self._local.participant = me
-        me.ident = threading.get_ident()
+        me.run_on_this_thread()
         self._await_baton(me)
 
     def leave(self, me: Participant) -> None:
@@ -248,6 +248,7 @@ class LockstepScheduler:
         """Pass the baton on, mutex held; a foreign thread has none but may have to start an idle clock."""
         if not me.foreign:
             self.running = None
+            me.stop_counting()
         if self.running is None:
             self.dispatch()
 

@@ -7,9 +7,10 @@ no thread is ready (``scheduler``). So the same scenario and seed give the same 
 Threads the clock does not know (a viewer's callbacks) may call into the framework at any moment: their waits are
 served too, but they run beside the lockstep and a run they touch is no longer repeatable.
 
-A plugin call that never waits freezes virtual time. A wall-clock guard therefore watches the sections marked by
-``guarded``: after ``hang_guard`` wall seconds the thread is *detached*: time goes on without it, and its next call into
-the clock raises ``ThreadDetached``. Once out of the section it goes on as a foreign thread, so that it can tidy up.
+A plugin call that never waits freezes virtual time. A guard therefore watches the sections marked by ``guarded``: once
+the thread has taken ``hang_guard`` real seconds, not counting what other programs took of the processor, it is
+*detached*: time goes on without it, and its next call into the clock raises ``ThreadDetached``. Once out of the section
+it goes on as a foreign thread, so that it can tidy up.
 
 Use it for simulation and tests. For a real robot use ``WallClock``.
 """
@@ -36,7 +37,8 @@ class SimClock(LockstepScheduler):
     Parameters
     ----------
     hang_guard : float
-        Wall seconds a guarded section may run without waiting before its thread is detached; 0 = never.
+        Real seconds that a thread may take (``own_time``) in a guarded section without waiting on the clock before it is
+        detached; 0 = any number.
     schedule : numpy.random.Generator, optional
         Explore interleavings: ready threads are picked at random and every lock may yield. For tests.
     external : bool
@@ -55,7 +57,7 @@ class SimClock(LockstepScheduler):
 
     @property
     def hang_guard(self) -> float:
-        """Wall seconds after which a guarded section is given up; 0 = never."""
+        """Real seconds after which a guarded section is given up; 0 = never."""
         return self._guard.limit
 
     @hang_guard.setter
@@ -78,7 +80,7 @@ class SimClock(LockstepScheduler):
         return SimThread(self, target, name, priority)
 
     def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> Section:
-        """Watch the section with the wall-clock guard, which calls ``on_hang`` on its own thread.
+        """Watch the section with the hang guard, which calls ``on_hang`` on its own thread.
 
         Sections may lie within each other; the time that counts is that of the outermost one, without what numba's
         compiler took of it.
