@@ -4,6 +4,7 @@
     python benchmarks/moving.py --seeds 0:50 --cases bay wide crossing --executive navigation --json results.jsonl
     python benchmarks/moving.py --pairs 100 --first-seed 1000 --json results.jsonl
     python benchmarks/moving.py --pairs 100 --first-seed 1000 --json results.jsonl --without
+    python benchmarks/moving.py --cases warehouse_2 warehouse_5 warehouse_10 warehouse_20 --seeds 6000:6004
     python benchmarks/moving.py --map slope --seeds 0:4 --cases bay wide --executive navigation
 
 Cases: ``head_on`` are two robots in a short corridor of one robot's width, with a bay, without, or closed at one end;
@@ -42,7 +43,10 @@ from terrain.scenarios.world_types import HeightfieldWorld, MapWorld
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.sweeps.command import parse_seeds
 
-NAMES = ("anna", "ben", "carla", "dora", "emil", "fritz", "greta", "hans", "ida", "jan")
+NAMES = (
+    "anna", "ben", "carla", "dora", "emil", "fritz", "greta", "hans", "ida", "jan",
+    "karl", "lena", "max", "nora", "otto", "paula", "ralf", "sina", "tom", "uta",
+)  # fmt: skip
 TIME_LIMIT = 240.0  # s for each goal
 QUICK_SEEDS = "0:2"
 
@@ -61,7 +65,7 @@ def scenario_of(case: str, seed: int, folder: Path, on: str = "costmap") -> Scen
     settings = Path(__file__).with_name("moving.yaml" if on == "costmap" else "moving_mesh.yaml").resolve()
     robots = tuple(
         OwnRobot(name=name, start=_pose(start), goals=(_pose(goal),))
-        for name, (start, goal) in zip(NAMES, ways, strict=False)
+        for name, (start, goal) in zip(NAMES[: len(ways)], ways, strict=True)
     )
     return Scenario(
         name=case,

@@ -110,4 +110,5 @@ CASES: dict[str, Callable[[np.random.Generator], Case]] = {
     "warehouse_2": lambda rng: warehouse(rng, 2),
     "warehouse_5": lambda rng: warehouse(rng, 5),
     "warehouse_10": lambda rng: warehouse(rng, 10),
+    "warehouse_20": lambda rng: warehouse(rng, 20),
 }

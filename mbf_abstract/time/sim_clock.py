@@ -37,8 +37,8 @@ class SimClock(LockstepScheduler):
     Parameters
     ----------
     hang_guard : float
-        Real seconds that a thread may take (``own_time``) in a guarded section without waiting on the clock before it is
-        detached; 0 = any number.
+        Real seconds that a thread may take (``own_time``) in a guarded section, without waiting on the clock, before it
+        is detached; 0 = any number.
     schedule : numpy.random.Generator, optional
         Explore interleavings: ready threads are picked at random and every lock may yield. For tests.
     external : bool
