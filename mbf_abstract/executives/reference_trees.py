@@ -215,6 +215,7 @@ def _unblock(options: TreeOptions) -> Behaviour:
     usual = _in_turn("unblock", o.clear, o.relax_controller, o.out_of_collision)
     if not (o.wait and o.give_way):
         return usual
+    usual = _in_turn("unblock", o.clear, o.relax_controller, o.out_of_collision, o.move_away)
     patient: list[Behaviour] = [Recovery(o.wait, "wait"), Recovery(o.wait, "wait on"), Recovery(o.give_way)]
     if o.reuse_path:
         patient.insert(0, _detour("plan around it", o, o.planner))

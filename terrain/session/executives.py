@@ -130,7 +130,7 @@ class MoveBaseDrive:
 
 
 class TreeDrive:
-    """A behaviour tree, with those of its recoveries that the server has loaded."""
+    """A behaviour tree, with those of its recoveries that the server has loaded under the names of their types."""
 
     def __init__(self, navigator: Navigator, make_tree: TreeMaker, planner: str, controller: str) -> None:
         self._navigator = navigator
@@ -158,6 +158,8 @@ class TreeDrive:
             out_of_collision=loaded("back_up"),
             relax_controller=loaded("relax"),
             move_away=loaded("move_away"),
+            wait=loaded("wait"),
+            give_way=loaded("give_way"),
         )
 
     def _as_move_base(self, result: TreeResult, goal: Pose) -> MoveBaseResult:

@@ -101,6 +101,12 @@ def test_finished_is_success_where_it_was_to_end(world, run, name, options, end)
     assert motion.commands[-1] == Twist()
 
 
+def test_a_robot_along_a_wall_turns_before_it_moves_away(world, run):
+    result, motion = run("move_away", world.map_of(before_the_wall), start=Pose.planar(3.0, 3.0, 1.4), clearance=1.9)
+    assert result.outcome == RecoveryOutcome.SUCCESS and motion.end.x == pytest.approx(2.6, abs=0.12)
+    assert motion.end.yaw == pytest.approx(0.0, abs=0.15)
+
+
 @pytest.mark.parametrize("name", MOVING)
 def test_time_over_is_pat_exceeded(world, run, name):
     result, motion = run(name, world.map_of(before_the_wall), StuckMotion, time_limit=1)
@@ -238,9 +244,9 @@ def test_moving_away_between_two_obstacles_is_impassable_where_the_clearance_is_
     assert motion.end.x == pytest.approx(3.0, abs=0.1)
 
 
-def test_moving_away_sideways_needs_an_omnidirectional_robot(world, run):
+def test_moving_away_sideways_needs_an_omnidirectional_robot_or_one_that_turns(world, run):
     wall = world.map_of(lambda x, y: y > 3.4)
-    assert run("move_away", wall, clearance=0.7)[0].outcome == RecoveryOutcome.IMPASSABLE
+    assert run("move_away", wall, clearance=0.7, yaw_rate=0.0)[0].outcome == RecoveryOutcome.IMPASSABLE
     result, motion = run("move_away", wall, clearance=0.7, omnidirectional=True)
     assert result.outcome == RecoveryOutcome.SUCCESS and motion.end.y < 2.8
 

@@ -65,9 +65,10 @@ class MapLayer(ABC):
         return ()
 
     def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """Those before which the robot stops: also what was cleared, until it is seen again or forgotten.
+        """The objects before which the robot must stop, at ``now`` [s]; none if the layer follows none.
 
-        What is new counts as moving as soon as it seems to.
+        They are those of ``tracked_objects``, and those that a clearing has hidden, until they are seen again or
+        forgotten. An object that was first seen a moment ago may be MOVING here while it still is WAITING there.
         """
         return self.tracked_objects(now)
 

@@ -1,8 +1,9 @@
 """Move away from the nearest obstacle: straight for an omnidirectional robot, else forward or back.
 
-When to use: the robot is not in a collision but so near to an obstacle that turning or planning fails. When not:
-between two obstacles at equal distance. It ends (IMPASSABLE) as soon as ``PROBE`` further on the clearance would not be
-larger than the largest so far.
+When to use: the robot is so near to an obstacle that driving or planning fails. When not: between two obstacles at
+equal distance. Where forward or back leads along the obstacle or into it, a robot that can turn on the spot turns until
+the obstacle is behind or ahead of it, whichever is less, and tries once more. It ends (IMPASSABLE) as soon as ``PROBE``
+further on the clearance would not be larger than the largest so far.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry import Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arithmetic import norm, rotated_back
 from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
@@ -25,6 +26,8 @@ PROBE = 0.05
 """Distance ahead [m] at which the clearance is checked before a move."""
 LEAST_GAIN = 0.2
 """Metres of clearance a metre of motion must bring; with less the robot slides along an obstacle."""
+ASIDE, TURNED = 0.5, 0.05
+"""An obstacle is aside if it is off the robot's axis by more than the first angle [rad], ahead or behind by the other."""
 
 
 class MoveAwayParameters(GuardedMotionParameters):
@@ -33,6 +36,7 @@ class MoveAwayParameters(GuardedMotionParameters):
     clearance: float = parameter(0.6, "Distance of the base from obstacles to reach.", unit="m", gt=0.0, le=10.0)
     speed: float = parameter(0.1, "How fast.", unit="m/s", gt=0.0, le=2.0)
     omnidirectional: bool = parameter(False, "Whether the robot can move sideways.")
+    yaw_rate: float = parameter(0.5, "How fast it turns on the spot; 0 = it does not.", unit="rad/s", ge=0.0, le=3.0)
 
 
 class MoveAwayRecovery(GuardedRecovery):
@@ -42,7 +46,17 @@ class MoveAwayRecovery(GuardedRecovery):
     parameters: MoveAwayParameters
 
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
-        """Move until the clearance is reached or cannot be improved."""
+        """Move until the clearance is reached or cannot be improved; where it cannot at once, turn first."""
+        result = self._move(request)
+        if result.outcome == RecoveryOutcome.IMPASSABLE and self._can_turn:
+            turn = self._turn_wanted(request.motion.pose())
+            if abs(turn) > ASIDE and self._turn(request, turn).success:
+                result = self._move(request)
+        reached = float(norm(self._nearest_obstacle(request.motion.pose())))
+        clearance = f"{reached:.2f} m" if math.isfinite(reached) else f"more than {self.parameters.clearance:.2f} m"
+        return RecoveryResult(result.outcome, f"{result.message or 'done'}, the clearance is {clearance}")
+
+    def _move(self, request: RecoveryRequest) -> RecoveryResult:
         best = 0.0
 
         def velocity(pose: Pose) -> Twist | RecoveryResult:
@@ -60,10 +74,30 @@ class MoveAwayRecovery(GuardedRecovery):
         def finished(pose: Pose) -> bool:
             return bool(norm(self._nearest_obstacle(pose)) >= self.parameters.clearance)
 
-        result = self.drive(request, velocity, finished)
-        reached = float(norm(self._nearest_obstacle(request.motion.pose())))
-        clearance = f"{reached:.2f} m" if math.isfinite(reached) else f"more than {self.parameters.clearance:.2f} m"
-        return RecoveryResult(result.outcome, f"{result.message or 'done'}, the clearance is {clearance}")
+        return self.drive(request, velocity, finished)
+
+    @property
+    def _can_turn(self) -> bool:
+        p = self.parameters
+        return p.yaw_rate > 0.0 and not p.omnidirectional and self.min_turning_radius == 0.0
+
+    def _turn_wanted(self, pose: Pose) -> float:
+        """Least turn [rad] after which the nearest obstacle is ahead or behind."""
+        x, y, _ = self._nearest_obstacle(pose).tolist()
+        bearing = math.atan2(y, x)
+        return bearing if abs(bearing) <= 0.5 * math.pi else normalize_angle(bearing + math.pi)
+
+    def _turn(self, request: RecoveryRequest, angle: float) -> RecoveryResult:
+        wanted = normalize_angle(request.motion.pose().yaw + angle)
+
+        def left(pose: Pose) -> float:
+            return normalize_angle(wanted - pose.yaw)
+
+        def velocity(pose: Pose) -> Twist:
+            limit = self.parameters.yaw_rate
+            return Twist.planar(wz=max(-limit, min(limit, 2.0 * left(pose))))
+
+        return self.drive(request, velocity, lambda pose: abs(left(pose)) <= TURNED)
 
     def _nearest_obstacle(self, pose: Pose) -> NDArray[np.float64]:
         """Position (3,) [m] of the nearest obstacle in the base frame; infinite if it is beyond the clearance."""

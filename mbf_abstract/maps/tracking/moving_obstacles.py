@@ -117,12 +117,12 @@ class MovingObstacles:
             yield Sighting(points, of_moving)
 
     def objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """The tracked objects at ``now`` [s]."""
+        """The tracked objects at ``now`` [s], without those that a clearing has hidden."""
         with self._lock:
             return self._tracker.objects(now)
 
     def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """Also those that were cleared and may still be there; what is new counts as moving once it seems to move."""
+        """The objects before which the robot must stop, at ``now`` [s]; see ``Tracker.objects``."""
         with self._lock:
             return self._tracker.objects(now, guarded=True)
 
@@ -162,11 +162,11 @@ class TrackingLayer(MapLayer):
         return self._objects.stale_reason(now, self.parameters.expected_update_rate)
 
     def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """The objects it follows."""
+        """The objects it follows, without those that a clearing has hidden."""
         return self._objects.objects(now)
 
     def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
-        """Also those that were cleared and are not seen again yet; what is new moves once it seems to."""
+        """The objects before which the robot must stop: the hidden ones too, and who has just begun to move."""
         return self._objects.guarded_objects(now)
 
 

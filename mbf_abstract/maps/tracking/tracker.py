@@ -32,8 +32,8 @@ BEGINNING = 0.5
 """An object that is not confirmed yet is forgotten after this share of ``forget_time``."""
 SHRINKING = 0.1
 """How fast [m/s] the remembered half size of an object falls to what is seen of it."""
-FASTEST_STEP = 1e-6
-"""Scans nearer in time than this [s] belong to the same moment."""
+SAME_MOMENT = 1e-6
+"""A scan that is older than the last one by no more than this [s] is taken in."""
 
 
 class TrackingParameters(ParameterModel):
@@ -111,7 +111,7 @@ class Tracker:
             Number of the confirmed object that each point belongs to; NO_OBJECT for the others.
         """
         found = np.full(len(points), NO_OBJECT, dtype=np.int64)
-        if stamp < self._time - FASTEST_STEP:
+        if stamp < self._time - SAME_MOMENT:
             return found
         p = self.parameters
         stride = -(-len(points) // MAX_POINTS) or 1
@@ -184,11 +184,17 @@ class Tracker:
         return np.asarray(np.isin(numbers, self._numbers[: self._count][moving]))
 
     def objects(self, now: float, *, guarded: bool = False) -> tuple[TrackedObject, ...]:
-        """The confirmed objects at ``now`` [s], the ones known for longest first; none that is unseen for too long.
+        """The confirmed objects, in the order in which they were first seen; none that is unseen for too long.
 
-        ``guarded`` is for who stops before them: those that were cleared and not seen since are among them, and who
-        is seen for less than ``standing_time`` moves if its estimated speed is that of a moving object. Waiting until
-        it has come ``moving_distance`` far would be too late where somebody comes out from behind a corner.
+        Parameters
+        ----------
+        now : float
+            For when [s] their places are given.
+        guarded : bool
+            For the guard that stops the robot before contact. Two things differ then: objects that ``clear`` has hidden
+            are among them; and an object that was first seen less than ``standing_time`` ago is moving as soon as its
+            estimated speed would take it ``moving_distance`` far in that time. To wait until it has come so far
+            would be too late where somebody comes out from behind a corner.
         """
         shown = self._confirmed() & (guarded | (self._room[:, states_of.CLEARED] == 0.0))
         rows = np.flatnonzero(shown).tolist()
@@ -196,7 +202,7 @@ class Tracker:
         return tuple(known for known in alike if known.unseen <= self.parameters.forget_time)
 
     def _seems_to_move(self, state: list[float], now: float) -> bool:
-        """Whether an object too new to have moved is as fast as those that do."""
+        """Whether an object, first seen a moment ago, is fast enough to come ``moving_distance`` in ``standing_time``."""
         p = self.parameters
         speed = math.hypot(state[states_of.VX], state[states_of.VY])
         return now - state[states_of.FIRST_SEEN] <= p.standing_time and speed * p.standing_time >= p.moving_distance

@@ -186,10 +186,12 @@ def test_move_away_gains_the_clearance(run):
     assert result.success and 0.3 - robot.state[0] >= 0.55
 
 
-def test_move_away_sideways_needs_an_omnidirectional_robot(run):
+def test_move_away_sideways_needs_an_omnidirectional_robot_or_one_that_turns(run):
     wall = around((-1, 0.3, 1, 0.4))
-    result, _, _ = run(MoveAwayRecovery, wall)
-    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    result, robot, _ = run(MoveAwayRecovery, wall, yaw_rate=0.0)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE and robot.state[2] == 0.0
+    result, robot, _ = run(MoveAwayRecovery, wall)
+    assert result.success and robot.state[1] < -0.2
     result, robot, _ = run(MoveAwayRecovery, wall, omnidirectional=True)
     assert result.success and robot.state[1] < -0.2
 
