@@ -27,7 +27,7 @@ PROBE = 0.05
 LEAST_GAIN = 0.2
 """Metres of clearance a metre of motion must bring; with less the robot slides along an obstacle."""
 ASIDE, TURNED = 0.5, 0.05
-"""An obstacle is aside if it is off the robot's axis by more than the first angle [rad], ahead or behind by the other."""
+"""An obstacle is aside if it is off the robot's axis by more than the first angle [rad]; a turn ends this near [rad]."""
 
 
 class MoveAwayParameters(GuardedMotionParameters):

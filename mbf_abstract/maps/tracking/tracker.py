@@ -202,7 +202,7 @@ class Tracker:
         return tuple(known for known in alike if known.unseen <= self.parameters.forget_time)
 
     def _seems_to_move(self, state: list[float], now: float) -> bool:
-        """Whether an object, first seen a moment ago, is fast enough to come ``moving_distance`` in ``standing_time``."""
+        """Whether an object that was first seen a moment ago is fast enough to be moving."""
         p = self.parameters
         speed = math.hypot(state[states_of.VX], state[states_of.VY])
         return now - state[states_of.FIRST_SEEN] <= p.standing_time and speed * p.standing_time >= p.moving_distance
