@@ -26,8 +26,10 @@ PROBE = 0.05
 """Distance ahead [m] at which the clearance is checked before a move."""
 LEAST_GAIN = 0.2
 """Metres of clearance a metre of motion must bring; with less the robot slides along an obstacle."""
-ASIDE, TURNED = 0.5, 0.05
-"""An obstacle is aside if it is off the robot's axis by more than the first angle [rad]; a turn ends this near [rad]."""
+ASIDE = 0.5
+"""Farther off the robot's axis than this [rad] an obstacle is aside."""
+TURNED = 0.05
+"""A turn ends when this little [rad] is left of it."""
 
 
 class MoveAwayParameters(GuardedMotionParameters):
