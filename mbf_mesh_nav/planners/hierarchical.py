@@ -16,6 +16,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.maps.getting_free import getting_free
 from mbf_abstract.maps.navigation_map import MapContext, MapPlugin
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -153,7 +154,8 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         if point is None:
             return problem.message
         reason = describe_blockage(there, snapshot, nearest_corner(there, point), limit)
-        return f"the {name} {position_text(pose.position)} is blocked: {reason}"
+        text = f"the {name} {position_text(pose.position)} is blocked: {reason}"
+        return f"{text}; {getting_free(self._map, pose)}" if name == "start" else text
 
     def _plan(self, first: TilePlace, last: TilePlace, flag: FlagArray, is_kept: bool = False) -> TiledPlan:
         """Plan a leg, by repair of the last plan if that is kept."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.maps.getting_free import getting_free
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
@@ -139,9 +140,11 @@ class SurfacePlanner(MeshPlanner):
             return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{where}, allowed are {reach:g} m; {hint}")
         vertex = nearest_corner(self.mesh_map, point)
         if blocked[vertex]:
-            outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
             reason = describe_blockage(self.mesh_map, snapshot, vertex, self.parameters.cost_limit)
-            return PlanResult(outcome, f"the {name} {position_text(pose.position)} is blocked: {reason}")
+            text = f"the {name} {position_text(pose.position)} is blocked: {reason}"
+            if name != "start":
+                return PlanResult(GetPathOutcome.BLOCKED_GOAL, text)
+            return PlanResult(GetPathOutcome.BLOCKED_START, f"{text}; {getting_free(self.mesh_map, pose)}")
         return point
 
     def _different_components(self, start: SurfacePoint, stop: SurfacePoint, name: str) -> PlanResult | None:

@@ -162,6 +162,16 @@ def test_forbidden_ground_is_entered_only_from_ground_as_hard(before, now, allow
 
 
 @pytest.mark.parametrize("planner_class", PLANNERS)
+def test_a_robot_in_the_ring_hears_how_it_gets_away(make_plugin, walled, planner_class):
+    walled.inscribed_radius = RING
+    for yaw, way in ((0.0, "backing up"), (math.pi, "driving on")):
+        request = PlanRequest(Pose.planar(2.8, 3.0, yaw), Pose.planar(1.0, 3.0))
+        result = make_plugin(planner_class, walled).make_plan(request)
+        assert result.outcome == GetPathOutcome.BLOCKED_START
+        assert "is blocked: cost 1" in result.message and f"it gets away by {way}" in result.message
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
 def test_a_goal_past_the_border_is_out_of_the_map(make_plugin, plain, planner_class):
     planner = make_plugin(planner_class, plain())
     result = planner.make_plan(PlanRequest(Pose.planar(1.0, 3.0), Pose.planar(6.3, 3.0)))
