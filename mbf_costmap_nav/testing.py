@@ -169,7 +169,7 @@ class _Site:
             self.background[self.background == UNKNOWN] = FREE
         self.cells = self.background.copy()
         layer.match_geometry(hall.geometry)
-        layer.set_footprint(Footprint.circle(0.2))
+        layer.set_footprint(Footprint.circle(0.2), Footprint.circle(0.2))
 
     def see(self, scans: Scans) -> CellArray:
         """Hand all scans to a layer that listens and update what it reports."""

@@ -15,6 +15,7 @@ from mbf_abstract.execution.plan_check import in_global_frame
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.goals.arrival_tolerance import tolerance_left
 from mbf_abstract.goals.goal_types import (
     ExePathFeedback,
     GetPathResult,
@@ -28,7 +29,6 @@ from mbf_abstract.server.plugin_table import PluginTable
 from mbf_abstract.time.clock import Stopwatch
 
 NO_REPLAN_WITHIN = 0.1  # m from the goal
-LEAST_SHARE_LEFT = 0.25  # of the tolerance, for stopping at the end of a path that does not reach the target
 FATAL = range(ExePathOutcome.INVALID_PATH, ExePathOutcome.INTERNAL_ERROR + 1)
 
 End = tuple[int, str]
@@ -177,10 +177,8 @@ class MoveBaseMachine:
     def _arrival_tolerance(self, path: Path) -> float | None:
         """What a path that ends off the target leaves of the tolerance [m]; None = the server's."""
         goal, off = self._job.handle.goal, path[-1].distance_to(self._target)
-        tolerance = self._dist_tolerance
-        if goal.goal_area is not None or off == 0.0 or tolerance == 0.0:
-            return goal.dist_tolerance
-        return max(tolerance - off, LEAST_SHARE_LEFT * tolerance)
+        left = None if goal.goal_area is not None else tolerance_left(self._dist_tolerance, off)
+        return goal.dist_tolerance if left is None else left
 
     @property
     def _dist_tolerance(self) -> float:

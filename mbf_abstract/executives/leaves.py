@@ -16,6 +16,7 @@ from py_trees.common import Status
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.nodes import Leaf
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goals.arrival_tolerance import tolerance_left
 from mbf_abstract.goals.goal_types import (
     ActionResult,
     ExePathGoal,
@@ -258,7 +259,16 @@ class ExePath(ActionLeaf):
     def make_goal(self) -> ExePathGoal:
         """Follow what is left of the path."""
         path = self._path = self.mission.path = self.mission.path_to_follow()
-        return ExePathGoal(path, controller=self.controller, concurrency_slot=self.slot)
+        tolerance = self._tolerance_left(path)
+        return ExePathGoal(path, controller=self.controller, concurrency_slot=self.slot, dist_tolerance=tolerance)
+
+    def _tolerance_left(self, path: Path) -> float | None:
+        """What a path that ends off the mission's target leaves of the server's tolerance [m]; None = all of it."""
+        target = self.mission.target
+        if target is None or target.frame_id != path.frame_id:
+            return None
+        tolerance = self.mission.navigator.server.runtime.parameters.dist_tolerance
+        return tolerance_left(tolerance, path[-1].distance_to(target))
 
     def update(self) -> Status:
         """Hand over a new path, pass feedback on, and wait for the end."""

@@ -58,7 +58,7 @@ class InflationLayer(CostmapLayer):
         self._seeds = np.zeros((geometry.height, geometry.width), dtype=np.uint8)
         self._tabulate()
 
-    def set_footprint(self, footprint: Footprint) -> None:
+    def set_footprint(self, footprint: Footprint, unpadded: Footprint) -> None:
         """Take over the inscribed radius."""
         self._inscribed_radius = footprint.inscribed_radius
         self._tabulate()

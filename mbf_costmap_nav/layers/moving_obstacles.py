@@ -61,7 +61,7 @@ class MovingObstaclesLayer(TrackingLayer, GridLayer):
         """True: what it frees was marked by sensors."""
         return True
 
-    def set_footprint(self, footprint: Footprint) -> None:
+    def set_footprint(self, footprint: Footprint, unpadded: Footprint) -> None:
         """Take over the inscribed radius."""
         self._inscribed_radius = footprint.inscribed_radius if len(footprint.vertices) > 2 else 0.0
 

@@ -35,7 +35,7 @@ class ObstacleLayerParameters(LayerParameters):
     combination_method: CombinationMethod = parameter(
         CombinationMethod.MAXIMUM, "How the layer's cells enter the costmap."
     )
-    footprint_clearing_enabled: bool = parameter(True, "Free the cells under the robot.")
+    footprint_clearing_enabled: bool = parameter(True, "Free the cells under the robot, without its padding.")
 
 
 class ObstacleLayer(GridLayer):
@@ -58,9 +58,9 @@ class ObstacleLayer(GridLayer):
         """Keep a scan for the next update."""
         self.buffers[scan.source].insert(scan)
 
-    def set_footprint(self, footprint: Footprint) -> None:
-        """Take over the outline under which the map is free."""
-        self._footprint = footprint
+    def set_footprint(self, footprint: Footprint, unpadded: Footprint) -> None:
+        """Take over the outline under which the map is free: without padding, where the robot does not reach."""
+        self._footprint = unpadded
 
     def stale_reason(self, now: float) -> str:
         """Name the source that is late at ``now`` [s]."""

@@ -138,8 +138,8 @@ class CostmapLayer(MapLayer):
         """Take over the grid of a rolling window that moved by (dx, dy) cells; keep the cells of the overlap."""
         self.geometry = geometry
 
-    def set_footprint(self, footprint: Footprint) -> None:
-        """Take over the robot's (padded) footprint."""
+    def set_footprint(self, footprint: Footprint, unpadded: Footprint) -> None:
+        """Take over the robot's outline, with its padding and without."""
 
     def parameters_changed(self) -> None:
         """Take over ``parameters``, which have just been replaced; the next update recomputes the whole map.

@@ -279,7 +279,7 @@ class LayeredCostmap(SnapshotAnswers):
             self.unpadded_footprint = footprint
             self.footprint = footprint.padded(self._footprint_padding)
             for layer in self.layers.values():
-                layer.set_footprint(self.footprint)
+                layer.set_footprint(self.footprint, self.unpadded_footprint)
             self._window.recompute_all()
 
     def _replace_parameters(self, name: str, parameters: LayerParameters) -> None:

@@ -286,6 +286,17 @@ def test_the_ground_under_the_robot_is_freed(build, seeing):
     assert lethal_cells(costmap) == {(8, 5)}
 
 
+def test_what_stands_in_the_padding_of_the_robot_is_kept(build, seeing):
+    """A controller that does not see it turns into it."""
+    outline = [(1.4, 1.4), (-1.4, 1.4), (-1.4, -1.4), (1.4, -1.4)]
+    seeing |= {"footprint_clearing_enabled": True}
+    costmap = build("obstacle", obstacle=seeing, outline=outline)
+    costmap.set_footprint(costmap.unpadded_footprint, padding=1.0)
+    costmap.insert_points("laser", [(6.5, 5.5, 0.0), (7.5, 5.5, 0.0)], (9.5, 5.5, 0.0), 0.0)
+    costmap.update(Pose.planar(5.5, 5.5), 0.0)
+    assert lethal_cells(costmap) == {(7, 5)}
+
+
 def test_persistent_observations_come_back_after_a_ray_cleared_them(build, seeing):
     seeing["sources"]["laser"]["observation_persistence"] = 1.0
     costmap = build("obstacle", obstacle=seeing)

@@ -45,6 +45,13 @@ def test_navigation_plans_once_and_arrives(make_session, recoveries):
     assert session.robot.pose.distance_to(GOAL) < 0.15
 
 
+def test_a_robot_whose_path_ends_beside_the_target_comes_the_nearer_to_its_end(make_session):
+    session = make_session(dist_tolerance=0.2)
+    session.planner.play(lambda request: straight_plan(replace(request, goal=Pose.planar(1.85, 0.0))))
+    assert run(session, navigation_tree(OPTIONS)).success
+    assert session.robot.pose.distance_to(GOAL) <= 0.2
+
+
 def test_a_failed_plan_is_followed_by_the_next_recovery_of_the_list(make_session, recoveries):
     session = make_session()
     session.planner.play(NO_PATH, NO_PATH, straight_plan)
