@@ -89,11 +89,11 @@ def floor_of(free: NDArray[np.bool_], folder: Path) -> MapWorld:
     return MapWorld(type="map", file=folder / "floor.yaml")
 
 
-def slope_of(free: NDArray[np.bool_], folder: Path) -> HeightfieldWorld:
+def slope_of(free: NDArray[np.bool_], folder: Path, rise: float = RISE) -> HeightfieldWorld:
     """Write a floor into a folder, as open ground that rises along x, with blocks where the walls are."""
     stride = 2  # every second cell: a mesh of all would be slow to plan on
     cells = free[::stride, ::stride]
-    heights = RISE * stride * RESOLUTION * np.arange(cells.shape[1]) + np.where(cells, 0.0, WALL_HEIGHT)
+    heights = rise * stride * RESOLUTION * np.arange(cells.shape[1]) + np.where(cells, 0.0, WALL_HEIGHT)
     np.savez(folder / "slope.npz", z=heights[::-1], dx=stride * RESOLUTION, dy=stride * RESOLUTION)
     return HeightfieldWorld(type="heightfield", file=folder / "slope.npz")
 
