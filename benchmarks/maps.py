@@ -208,10 +208,12 @@ def building_row(number: int, folder: Path) -> tuple[Scenario, Row]:
     seed = FIRST_SEED + number
     scenario = load_scenario("bridge" if number % 2 == 0 else "garage_roof")
     if number % 2:
-        scenario = scenario.model_copy(update={"world": GarageWorld(type="garage", floors=2 + number // 2)})
-    world = scenario.world.levels()  # type: ignore[union-attr]
+        world = GarageWorld(type="garage", floors=2 + number // 2)
+        time_limit = scenario.time_limit * max(1.0, world.floors / scenario.world.floors)  # type: ignore[union-attr]
+        scenario = scenario.model_copy(update={"world": world, "time_limit": time_limit})
+    levels = scenario.world.levels()  # type: ignore[union-attr]
     rng = np.random.default_rng([seed, CLOUD_STREAM])
-    points = np.vstack([scan_surface(world.ground, rng), scan_surface(world.walls, rng)])
+    points = np.vstack([scan_surface(levels.ground, rng), scan_surface(levels.walls, rng)])
     built = built_map(points, build_surface(points))
     maps = write_maps(folder, f"{scenario.name}_{number}", {"built": built})
     # The world writes the true map itself, so no setting names a file.
