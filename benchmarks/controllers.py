@@ -20,8 +20,8 @@ import numpy as np
 
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.plugins import ControlRequest
-from mbf_costmap_nav.controllers.dwa import DwaController
-from mbf_costmap_nav.controllers.mppi import MppiController
+from mbf_costmap_nav.controllers.dwa import DWAController
+from mbf_costmap_nav.controllers.mppi import MPPIController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
@@ -84,7 +84,7 @@ def main() -> None:
     request = ControlRequest(Pose.planar(0.0, 0.05, 0.05), Twist.planar(0.3))
     peer = numpy_rollout(np.random.default_rng(0), grid)
     results: dict[str, float] = {}
-    for controller_class in (MppiController, DwaController, RegulatedPurePursuitController):
+    for controller_class in (MPPIController, DWAController, RegulatedPurePursuitController):
         parameters = controller_class.Parameters()
         rng = np.random.default_rng(0)
         context = CostmapContext("benchmark", parameters, StandingClock(), rng, None, costmap)

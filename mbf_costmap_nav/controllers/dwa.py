@@ -30,7 +30,7 @@ FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 
 
-class DwaParameters(PluginParameters):
+class DWAParameters(PluginParameters):
     """Parameters of ``costmap.dwa``."""
 
     max_vel_x: float = parameter(0.5, "Largest forward speed.", unit="m/s", gt=0.0, le=20.0)
@@ -53,11 +53,11 @@ class DwaParameters(PluginParameters):
     moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
 
 
-class DwaController(PathFollower):
+class DWAController(PathFollower):
     """Samples the dynamic window and scores the arcs."""
 
-    Parameters: ClassVar[type[PluginParameters]] = DwaParameters
-    parameters: DwaParameters
+    Parameters: ClassVar[type[PluginParameters]] = DWAParameters
+    parameters: DWAParameters
 
     @property
     def turns_on_the_spot(self) -> bool:

@@ -49,7 +49,7 @@ FALLBACK_SAMPLES = 30
 """How many of the best single samples are tried when the mean does not fit."""
 
 
-class MppiParameters(PluginParameters):
+class MPPIParameters(PluginParameters):
     """Parameters of ``costmap.mppi``."""
 
     motion_model: Literal["differential", "omni", "ackermann"] = parameter(
@@ -88,11 +88,11 @@ class MppiParameters(PluginParameters):
     moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
 
 
-class MppiController(PathFollower):
+class MPPIController(PathFollower):
     """Model predictive path integral control."""
 
-    Parameters: ClassVar[type[PluginParameters]] = MppiParameters
-    parameters: MppiParameters
+    Parameters: ClassVar[type[PluginParameters]] = MPPIParameters
+    parameters: MPPIParameters
 
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)

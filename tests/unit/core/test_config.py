@@ -11,12 +11,12 @@ from mbf_abstract.parameters import ParameterModel, PluginParameters, parameter
 from mbf_abstract.plugins import AbstractPlanner, AbstractRecovery, PlanResult, PluginKind, RecoveryResult
 
 
-class CvpParameters(PluginParameters):
+class CVPParameters(PluginParameters):
     cost_limit: float = parameter(1.0, "Cost limit.", ge=0.0, le=1.0)
 
 
-class Cvp(AbstractPlanner):
-    Parameters = CvpParameters
+class CVP(AbstractPlanner):
+    Parameters = CVPParameters
 
     def make_plan(self, request):
         return PlanResult(0)
@@ -57,7 +57,7 @@ def nothing_installed(monkeypatch):
 
 def registry(**options):
     registry = PluginRegistry("mesh", **options)
-    registry.register(PluginKind.PLANNER, "mesh.cvp", Cvp)
+    registry.register(PluginKind.PLANNER, "mesh.cvp", CVP)
     registry.register(PluginKind.RECOVERY, "wait", Wait)
     registry.register("mesh_layers", "mesh.steepness", Steepness)
     registry.register("mesh_layers", "mesh.plain", dict)
@@ -101,8 +101,8 @@ def test_a_good_configuration_becomes_classes_and_models(tmp_path):
     assert config.backend == "mesh"
     assert config.parameters.controller_frequency == 10.0
     assert [(spec.kind, spec.name, spec.plugin_class) for spec in config.plugins] == [
-        (PluginKind.PLANNER, "first", Cvp),
-        (PluginKind.PLANNER, "second", Cvp),
+        (PluginKind.PLANNER, "first", CVP),
+        (PluginKind.PLANNER, "second", CVP),
         (PluginKind.RECOVERY, "pause", Wait),
     ]
     assert [spec.parameters.cost_limit for spec in config.plugins if spec.kind is PluginKind.PLANNER] == [1.0, 0.5]

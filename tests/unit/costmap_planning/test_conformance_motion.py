@@ -7,8 +7,8 @@ import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.plugins import ControlRequest, PlanRequest
-from mbf_costmap_nav.controllers.dwa import DwaController
-from mbf_costmap_nav.controllers.mppi import MppiController
+from mbf_costmap_nav.controllers.dwa import DWAController
+from mbf_costmap_nav.controllers.mppi import MPPIController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
@@ -77,8 +77,8 @@ def test_f155_one_point_is_an_obstacle():
     ("controller_class", "more"),
     [
         pytest.param(RegulatedPurePursuitController, {}, id="F145-pursuit"),
-        pytest.param(DwaController, {"window_time": 0.05}, id="F145-dwa"),
-        pytest.param(MppiController, {"acc_lim_x": 2.5}, id="F145-mppi"),
+        pytest.param(DWAController, {"window_time": 0.05}, id="F145-dwa"),
+        pytest.param(MPPIController, {"acc_lim_x": 2.5}, id="F145-mppi"),
     ],
 )
 def test_from_one_command_to_the_next_the_speed_changes_within_the_acceleration(make_plugin, controller_class, more):

@@ -16,8 +16,8 @@ from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_abstract.time.sim_clock import SimClock
-from mbf_costmap_nav.controllers.dwa import DwaController
-from mbf_costmap_nav.controllers.mppi import MppiController
+from mbf_costmap_nav.controllers.dwa import DWAController
+from mbf_costmap_nav.controllers.mppi import MPPIController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.files.map_io import load_image
 from mbf_costmap_nav.grid.costmap import Costmap
@@ -124,8 +124,8 @@ def limit_speed():
     ("controller_class", "full_speed"),
     [
         pytest.param(RegulatedPurePursuitController, 0.5, id="F105-pursuit"),
-        pytest.param(DwaController, 0.5, id="F105-dwa"),
-        pytest.param(MppiController, 0.5, id="F105-mppi"),
+        pytest.param(DWAController, 0.5, id="F105-dwa"),
+        pytest.param(MPPIController, 0.5, id="F105-mppi"),
     ],
 )
 def test_a_speed_limit_in_percent_holds_until_it_is_lifted(make_plugin, limit_speed, controller_class, full_speed):

@@ -17,15 +17,15 @@ from mbf_abstract.plugins import ControlRequest, RecoveryRequest
 from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.time.sim_clock import SimClock
-from mbf_costmap_nav.controllers.dwa import DwaController
-from mbf_costmap_nav.controllers.mppi import MppiController
+from mbf_costmap_nav.controllers.dwa import DWAController
+from mbf_costmap_nav.controllers.mppi import MPPIController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.controllers.rotation_shim import RotationShimController
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.recoveries.escape import EscapeRecovery
 
 T_map_odom = Transform((2.0, 1.0, 0.0), quaternion_from_yaw(math.pi / 2), "map", "odom", static=True)
-CONTROLLERS = [RegulatedPurePursuitController, DwaController, MppiController, RotationShimController]
+CONTROLLERS = [RegulatedPurePursuitController, DWAController, MPPIController, RotationShimController]
 
 
 def in_map_and_odom(*boxes):

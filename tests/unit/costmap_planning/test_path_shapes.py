@@ -8,8 +8,8 @@ import pytest
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_costmap_nav.controllers.dwa import DwaController
-from mbf_costmap_nav.controllers.mppi import MppiController
+from mbf_costmap_nav.controllers.dwa import DWAController
+from mbf_costmap_nav.controllers.mppi import MPPIController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.controllers.rotation_shim import RotationShimController
 from mbf_costmap_nav.grid.costmap import Costmap
@@ -21,11 +21,11 @@ MPPI_CAR = {"motion_model": "ackermann", "min_turning_radius": CAR_RADIUS, "batc
 PURSUIT_CAR = {"rotate_to_heading": False, "min_turning_radius": CAR_RADIUS}
 ON_THE_SPOT = {
     "pursuit": (RegulatedPurePursuitController, {}),
-    "mppi": (MppiController, {"batch_size": 500}),
-    "dwa": (DwaController, {}),
+    "mppi": (MPPIController, {"batch_size": 500}),
+    "dwa": (DWAController, {}),
     "shim": (RotationShimController, {"inner_type": "mppi", "inner": {"batch_size": 500}}),
 }
-CARS = {"pursuit": (RegulatedPurePursuitController, PURSUIT_CAR), "mppi": (MppiController, MPPI_CAR)}
+CARS = {"pursuit": (RegulatedPurePursuitController, PURSUIT_CAR), "mppi": (MPPIController, MPPI_CAR)}
 
 
 def out_and_back(spacing):
@@ -137,7 +137,7 @@ HYBRID_GOALS = [(-1.2, 0.19, -2.68), (-0.3, 1.46, 0.59), (-0.2, 1.02, 0.71), (0.
 def test_a_car_comes_to_the_end_of_a_hybrid_plan_with_its_heading_at_once(make_plugin, closed_loop, goal):
     planner = make_plugin(HybridAStarPlanner, FREE_MAP, min_turning_radius=1.3)
     path = planner.make_plan(PlanRequest(Pose.planar(0.0, 0.0), Pose.planar(*goal))).path
-    controller = make_plugin(MppiController, FREE_MAP, **{**MPPI_CAR, "min_turning_radius": 1.06, "max_vel_theta": 1.0})
+    controller = make_plugin(MPPIController, FREE_MAP, **{**MPPI_CAR, "min_turning_radius": 1.06, "max_vel_theta": 1.0})
     robot, outcome, seconds = closed_loop.follow(
         controller, path, FREE_MAP, start=(0.0, 0.0, 0.0), seconds=60.0, dist_tolerance=0.25, angle_tolerance=0.3
     )
@@ -146,7 +146,7 @@ def test_a_car_comes_to_the_end_of_a_hybrid_plan_with_its_heading_at_once(make_p
 
 
 def test_a_car_that_stands_beside_its_goal_asks_for_another_plan(make_plugin, closed_loop):
-    controller = make_plugin(MppiController, FREE_MAP, **MPPI_CAR)
+    controller = make_plugin(MPPIController, FREE_MAP, **MPPI_CAR)
     path = Path.from_points([(x, 0.0, 0.0) for x in np.linspace(-0.6, 0.0, 7)])
     _, outcome, seconds = closed_loop.follow(controller, path, FREE_MAP, start=(0.0, 0.35, 0.0), seconds=30.0)
     assert outcome == ExePathOutcome.NO_VALID_CMD and seconds < 15.0
@@ -155,15 +155,15 @@ def test_a_car_that_stands_beside_its_goal_asks_for_another_plan(make_plugin, cl
 def test_plugins_keep_to_the_curve_of_their_robot_where_no_parameter_differs(make_plugin):
     for plugin_class, parameters in (
         (HybridAStarPlanner, {}),
-        (MppiController, {"motion_model": "ackermann"}),
+        (MPPIController, {"motion_model": "ackermann"}),
         (RegulatedPurePursuitController, {}),
     ):
         plugin = make_plugin(plugin_class, FREE_MAP, turning_radius=1.2, **parameters)
         assert plugin.turning_radius == 1.2
         own = make_plugin(plugin_class, FREE_MAP, turning_radius=1.2, min_turning_radius=2.0, **parameters)
         assert own.turning_radius == 2.0
-    assert make_plugin(MppiController, FREE_MAP, motion_model="ackermann").turning_radius == 0.5
-    assert make_plugin(MppiController, FREE_MAP, turning_radius=1.2).turns_on_the_spot
+    assert make_plugin(MPPIController, FREE_MAP, motion_model="ackermann").turning_radius == 0.5
+    assert make_plugin(MPPIController, FREE_MAP, turning_radius=1.2).turns_on_the_spot
 
 
 def test_pure_pursuit_never_turns_a_car_on_the_spot(make_plugin, closed_loop):

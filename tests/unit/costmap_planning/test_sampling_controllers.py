@@ -12,15 +12,15 @@ from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_costmap_nav.control.trajectory_scoring import footprint_discs
-from mbf_costmap_nav.controllers.dwa import DwaController, sample_velocities, sample_window, slowed_down
-from mbf_costmap_nav.controllers.mppi import IDLE_CYCLES, MppiController
+from mbf_costmap_nav.controllers.dwa import DWAController, sample_velocities, sample_window, slowed_down
+from mbf_costmap_nav.controllers.mppi import IDLE_CYCLES, MPPIController
 from mbf_costmap_nav.critics.obstacle_critic import VALUE_OF_COST
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.kernels.control.critics import alignment, furthest_reached, map_costs, mean_angle_to
 from mbf_costmap_nav.kernels.control.rollout import add_noise, clip_velocities, integrate
 from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
 
-CONTROLLERS = [DwaController, MppiController]
+CONTROLLERS = [DWAController, MPPIController]
 CAR = {"motion_model": "ackermann"}
 FREE_MAP = Costmap(np.zeros((200, 200), dtype=np.uint8), 0.05, -5.0, -5.0)
 seeds = st.integers(0, 2**32 - 1)
@@ -174,7 +174,7 @@ def test_a_straight_path_is_driven_forward(make_plugin, controller_class):
     assert result.command.vx > 0.2 and abs(result.command.wz) < 0.3
 
 
-@pytest.mark.parametrize(("controller_class", "model"), [(DwaController, {}), (MppiController, CAR)])
+@pytest.mark.parametrize(("controller_class", "model"), [(DWAController, {}), (MPPIController, CAR)])
 def test_a_robot_that_lets_somebody_by_is_not_stuck_and_names_them(make_plugin, controller_class, model):
     controller = make_plugin(controller_class, FREE_MAP, min_vel_x=0.0, **model)
     comes = TrackedObject(4, Motion.MOVING, 0.9, 0.0, 0.0, -0.4, 0.0, 0.25, 0.05, 0.1, 5.0, 0.0, 0.0, 0.0, "map")
@@ -223,13 +223,13 @@ def test_mppi_drives_around_an_obstacle_that_is_on_the_path(make_plugin, closed_
     cells = np.zeros((200, 200), dtype=np.uint8)
     cells[97:104, 128:134] = 254
     costmap = Costmap(closed_loop.inflated(cells, 0.05, decay=4.0), 0.05, -5.0, -5.0)
-    robot, outcome, _ = closed_loop.follow(make_plugin(MppiController, costmap), straight(), costmap, start=(0, 0, 0))
+    robot, outcome, _ = closed_loop.follow(make_plugin(MPPIController, costmap), straight(), costmap, start=(0, 0, 0))
     assert outcome == 0 and max(abs(state[1]) for state in robot.trace) > 0.3
 
 
 def test_an_ackermann_robot_gets_steering_angles_within_its_turning_circle(make_plugin):
     controller = make_plugin(
-        MppiController, FREE_MAP, motion_model="ackermann", wheelbase=0.4, min_turning_radius=0.8, batch_size=500
+        MPPIController, FREE_MAP, motion_model="ackermann", wheelbase=0.4, min_turning_radius=0.8, batch_size=500
     )
     controller.set_plan(Path.from_points([(0, y, 0.0) for y in np.linspace(0, 3, 31)]))
     for _ in range(5):
@@ -239,7 +239,7 @@ def test_an_ackermann_robot_gets_steering_angles_within_its_turning_circle(make_
 
 
 def test_mppi_reports_the_sequence_it_means_to_drive_next_and_dwa_reports_none(make_plugin):
-    controller = make_plugin(MppiController, FREE_MAP, batch_size=500)
+    controller = make_plugin(MPPIController, FREE_MAP, batch_size=500)
     controller.set_plan(straight())
     for _ in range(20):
         controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist.planar(0.3)))
@@ -249,12 +249,12 @@ def test_mppi_reports_the_sequence_it_means_to_drive_next_and_dwa_reports_none(m
     assert motion.velocities.shape == (controller.parameters.time_steps, 3)
     forward, sideways, turn = motion.velocities.sum(axis=0) * motion.step_time
     assert forward > 0.3 and sideways == 0.0 and abs(turn) < 0.2
-    assert make_plugin(DwaController, FREE_MAP).planned_motion() is None
+    assert make_plugin(DWAController, FREE_MAP).planned_motion() is None
 
 
 def test_an_omnidirectional_robot_drives_sideways(make_plugin):
     weights = {"twirling": 20.0, "path_angle": 0.0}
-    controller = make_plugin(MppiController, FREE_MAP, motion_model="omni", batch_size=1000, critics=weights)
+    controller = make_plugin(MPPIController, FREE_MAP, motion_model="omni", batch_size=1000, critics=weights)
     controller.set_plan(Path.from_points([(0, y, 0.0) for y in np.linspace(0, 3, 31)]))
     for _ in range(10):
         command = controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist())).command
@@ -269,7 +269,7 @@ BEND = Path.from_points(
 def test_an_ackermann_robot_drives_a_bend_without_ever_turning_tighter_than_it_can(make_plugin, closed_loop):
     radius = 0.6
     controller = make_plugin(
-        MppiController, FREE_MAP, motion_model="ackermann", min_turning_radius=radius, batch_size=500
+        MPPIController, FREE_MAP, motion_model="ackermann", min_turning_radius=radius, batch_size=500
     )
     robot, outcome, _ = closed_loop.follow(
         controller, BEND, FREE_MAP, start=(0, 0, 0), dist_tolerance=0.25, angle_tolerance=math.pi
@@ -282,7 +282,7 @@ def test_an_ackermann_robot_drives_a_bend_without_ever_turning_tighter_than_it_c
 
 def test_an_omnidirectional_robot_drives_a_bend_without_turning(make_plugin, closed_loop):
     weights = {"twirling": 20.0, "path_angle": 0.0, "prefer_forward": 0.0}
-    controller = make_plugin(MppiController, FREE_MAP, motion_model="omni", batch_size=500, critics=weights)
+    controller = make_plugin(MPPIController, FREE_MAP, motion_model="omni", batch_size=500, critics=weights)
     robot, outcome, _ = closed_loop.follow(
         controller, BEND, FREE_MAP, start=(0, 0, 0), dist_tolerance=0.2, angle_tolerance=math.pi
     )
@@ -291,7 +291,7 @@ def test_an_omnidirectional_robot_drives_a_bend_without_turning(make_plugin, clo
 
 
 def test_a_differential_robot_never_moves_sideways(make_plugin):
-    controller = make_plugin(MppiController, FREE_MAP, batch_size=500)
+    controller = make_plugin(MPPIController, FREE_MAP, batch_size=500)
     controller.set_plan(Path.from_points([(0, y, 0.0) for y in np.linspace(0, 3, 31)]))
     for _ in range(5):
         command = controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist())).command
@@ -302,7 +302,7 @@ def test_a_differential_robot_never_moves_sideways(make_plugin):
 @pytest.mark.parametrize("off", [math.pi / 4, math.pi / 2], ids=["45 degrees", "90 degrees"])
 def test_a_car_that_looks_away_from_its_path_turns_onto_it(make_plugin, closed_loop, radius, off):
     controller = make_plugin(
-        MppiController, FREE_MAP, motion_model="ackermann", min_turning_radius=radius, batch_size=1000
+        MPPIController, FREE_MAP, motion_model="ackermann", min_turning_radius=radius, batch_size=1000
     )
     path = Path.from_points([(x, 0.0, 0.0) for x in np.linspace(-3.0, 3.0, 121)])
     robot, outcome, _ = closed_loop.follow(
@@ -313,7 +313,7 @@ def test_a_car_that_looks_away_from_its_path_turns_onto_it(make_plugin, closed_l
 
 @pytest.mark.parametrize(
     ("controller_class", "parameters"),
-    [(MppiController, {"motion_model": "omni", "batch_size": 500}), (DwaController, {"max_vel_y": 0.5})],
+    [(MPPIController, {"motion_model": "omni", "batch_size": 500}), (DWAController, {"max_vel_y": 0.5})],
     ids=["mppi", "dwa"],
 )
 def test_an_omnidirectional_robot_keeps_the_speed_limit_on_a_slant_too(

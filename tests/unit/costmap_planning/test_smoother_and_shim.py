@@ -208,7 +208,7 @@ def findings_of(tmp_path, text):
     return []
 
 
-@pytest.mark.parametrize("name", ["dwa", "costmap.dwa", "mbf_costmap_nav.controllers.dwa:DwaController"])
+@pytest.mark.parametrize("name", ["dwa", "costmap.dwa", "mbf_costmap_nav.controllers.dwa:DWAController"])
 def test_the_shim_takes_every_type_that_the_list_of_controllers_takes(make_plugin, tmp_path, name):
     assert findings_of(tmp_path, f'shim:\n  inner_type: "{name}"\n  inner: {{max_vel_x: 0.3}}\n') == []
     shim = make_plugin(RotationShimController, FREE, inner_type=name, inner={"max_vel_x": 0.3})
@@ -241,7 +241,7 @@ def test_the_inner_block_is_checked_like_any_other(tmp_path):
 
 
 def test_the_shim_is_no_way_around_the_refusal_of_module_types(tmp_path):
-    name = "mbf_costmap_nav.controllers.dwa:DwaController"
+    name = "mbf_costmap_nav.controllers.dwa:DWAController"
     text = f'shim:\n  inner_type: "{name}"\nallow_module_types: false\n'
     ((line, key, message),) = findings_of(tmp_path, text)
     assert (line, key) == (7, "shim.inner_type") and "switched off" in message
