@@ -70,7 +70,9 @@
       "No behaviour tree runs; start with --executive navigation to see one." });
   };
 
-  const showValues = (rows) => {
+  let values = [], placing = ""; // under the pointer, and what a click there places as far as the server knows
+  const showReadout = () => {
+    const rows = steers && values.length ? [...values, ["a click is", placing, ""]] : values;
     readout.style.display = rows.length ? "block" : "none";
     readout.replaceChildren();
     for (const [name, value, colour] of rows) {
@@ -80,6 +82,8 @@
       element(row, "b", "font-variant-numeric:tabular-nums;padding-left:10px;", { textContent: value });
     }
   };
+  const showValues = (rows) => { values = rows; showReadout(); };
+  const showPlacing = (what) => { placing = what; showReadout(); };
 
   // ---------------------------------------------------------------------------------------- where the pointer is
   let canvas = null;
@@ -218,7 +222,8 @@
     addStick();
   };
   const takeBeat = (time) => { beat = time; if (stick) reportStick(); };
-  const shown = { beat: takeBeat, values: showValues, tree: showTree, stick: showStatus, role: (role) => { if (role === "steer" && !steers) steer(); } };
+  const shown = { beat: takeBeat, values: showValues, placing: showPlacing, tree: showTree, stick: showStatus,
+    role: (role) => { if (role === "steer" && !steers) steer(); } };
   socket.onmessage = (event) => {
     for (const [kind, content] of Object.entries(JSON.parse(event.data))) shown[kind]?.(content);
   };

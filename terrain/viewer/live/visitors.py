@@ -37,9 +37,13 @@ class Visitors:
         channel.actions = self
 
     def show(self, robot: FloatArray) -> None:
-        """Send every visitor the values under the pointer, and move the cameras; ``robot`` (3,) is where it is [m]."""
+        """Send visitors the values under their pointers and what a click places, and move the cameras.
+
+        ``robot`` (3,) is where it is [m].
+        """
         self._robot = robot
         self._cameras.show(robot)
+        self._channel.broadcast("placing", self._controls.placing.value)
         pointers = dict(self._pointers)
         if pointers:
             self._readout.begin_frame()

@@ -56,8 +56,12 @@ class Page:
         return answer["result"].get("value")
 
     async def wait_for(self, expression, seconds=60.0):
-        """Poll until a JavaScript expression is true."""
-        await asyncio.wait_for(self._poll(expression), seconds)
+        """Poll until a JavaScript expression is true; after so many seconds it names what never came."""
+        try:
+            await asyncio.wait_for(self._poll(expression), seconds)
+        except asyncio.TimeoutError as error:  # not the built-in one before Python 3.11
+            text = await self.evaluate("document.body.innerText")
+            raise AssertionError(f"never true within {seconds:g} s: {expression}; the page shows: {text}") from error
 
     async def _poll(self, expression):
         while not await self.evaluate(expression):
@@ -67,6 +71,10 @@ class Page:
         for domain in ("Page", "Runtime", "Log", "Network"):
             await self.command(f"{domain}.enable")
         await self.command("Page.navigate", url=url)
+
+    async def move(self, x, y):
+        """Move the pointer to a place of the window, in pixels."""
+        await self.command("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y, button="none")
 
     async def click(self, x, y):
         """Press and release the left mouse button at a place of the window, in pixels."""

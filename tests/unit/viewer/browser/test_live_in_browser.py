@@ -134,6 +134,8 @@ def test_a_drag_is_a_goal_with_a_heading_waypoints_are_driven_and_the_stick_driv
         await page.wait_for(f"{VALUES}.includes('inflation')")  # a layer, after the map's next update
         values = await page.evaluate(VALUES)
         await page.choose("a click is", "a waypoint")
+        await page.move(x, y)
+        await page.wait_for(f"/a click is\\s*a waypoint/.test({VALUES})")  # the choice has come to the run
         await page.click(x, y)
         await page.drag((x - 80, y + 60), (x - 80, y), modifiers=8)
         await page.read("· 2: ")
