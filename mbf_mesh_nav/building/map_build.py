@@ -73,7 +73,10 @@ def build_map(
         drop_invalid=drop_invalid,
         on_file=lambda file: on_step(f"reading {file.name}"),
     )
-    surface = build_surface(cloud.points, parameters, on_step)
+    try:
+        surface = build_surface(cloud.points, parameters, on_step)
+    except MeshError as error:
+        raise MeshError(", ".join(map(str, files)), error.reasons, error.hint) from error
     facts, mesh = map_facts(cloud, surface), DecimatedMesh(surface.vertices, surface.faces)
     if parameters is not None and is_decimated:
         on_step("decimation")

@@ -1,7 +1,8 @@
 """Names of coordinate systems, by their form: nothing is transformed, so no register of them is needed.
 
-Forms: a code of EPSG, well-known text (OGC 01-009 and ISO 19162) and the strings of the library PROJ. Whether a code
-exists is not checked.
+Forms: a code of EPSG, well-known text (OGC 01-009 and ISO 19162) and the strings of the library PROJ. Refused are
+what has none of the forms, a zone of UTM that does not exist, and systems in degrees or around the earth's centre: of
+codes the usual ones. Whether a code or a projection exists is not checked.
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ LONGEST_NAME = 200
 """Characters of the name of a coordinate system, which is kept in the header of a map file."""
 LEAST_CODE, GREATEST_CODE = 1024, 32766
 """Codes that EPSG gives."""
-DEGREES = (4258, 4269, 4326, 4979)
-"""Codes of the usual systems in degrees: ETRS89, NAD83, WGS 84 in two and three dimensions."""
+DEGREES = (4171, 4258, 4267, 4269, 4277, 4283, 4314, 4326, 4490, 4612, 4617, 4674, 4937, 4979, 6318, 6668, 7844)
+"""Codes of the usual systems in degrees, such as ETRS89, NAD83 and WGS 84, in two and three dimensions."""
+GEOCENTRIC = (4936, 4978)
+"""Codes of the usual systems with the earth's centre as origin: ETRS89 and WGS 84."""
 
 CODE = re.compile(r"(?:EPSG:|urn:ogc:def:crs:EPSG:[\d.]*:)(\d+)(?:\+(\d+))?", re.IGNORECASE)
 """Of a whole system, or of its horizontal and its vertical part."""
@@ -26,7 +29,10 @@ WELL_KNOWN_TEXT = re.compile(
     r'\s*\[.*"[^"]+".*\]',
     re.IGNORECASE | re.DOTALL,
 )
-DEGREES_OF_TEXT = re.compile(r"GEOG", re.IGNORECASE)
+DEGREES_OF_TEXT = re.compile(r'\s*(?:(?:COMPD_CS|COMPOUNDCRS)\s*\[\s*"[^"]*"\s*,\s*)?GEOG', re.IGNORECASE)
+GEOCENTRIC_FORM = re.compile(r"GEOCCS|\+proj=(?:geocent|cart)\b", re.IGNORECASE)
+ZONE_OF_PROJ = re.compile(r"\+proj=utm\b(?:.*\s)?\+zone=(\S+)|\+zone=(\S+)\s.*\+proj=utm\b")
+"""The zone of a system of UTM, of which there are 60."""
 CODE_OF_TEXT = re.compile(r'(?:AUTHORITY\["EPSG",\s*"?(\d+)"?\]|ID\["EPSG",\s*(\d+)\])\s*\]\s*$')
 """The code of a whole coordinate system, which stands at the end of its text."""
 NAME_OF_TEXT = re.compile(r'^\s*\w+\s*\["([^"]+)"')
@@ -50,22 +56,37 @@ def given_system(text: str) -> str:
     Raises
     ------
     MeshError
-        The text has none of the forms, is too long, or is a system in degrees, in which no map can be.
+        The text has none of the forms, is too long or names a zone of UTM that there is not; or it is a system in
+        degrees or around the earth's centre, in which no map can be.
     """
     given = text.strip()
     if not given:
         return ""
-    name, is_degrees = "", False
+    name, is_degrees, is_geocentric = "", False, GEOCENTRIC_FORM.match(given) is not None
     if match := CODE.fullmatch(given):
         codes = [int(code) for code in match.groups() if code]
         if all(LEAST_CODE <= code <= GREATEST_CODE for code in codes):
             name, is_degrees = f"EPSG:{'+'.join(map(str, codes))}", codes[0] in DEGREES
+            is_geocentric = codes[0] in GEOCENTRIC
     elif WELL_KNOWN_TEXT.fullmatch(given) and given.count("[") == given.count("]"):
         name, is_degrees = name_of_text(given), DEGREES_OF_TEXT.match(given) is not None
     elif len(given) <= LONGEST_NAME and given.isascii() and given.isprintable() and PROJ_STRING.fullmatch(given):
         name, is_degrees = given, DEGREES_OF_PROJ.search(given) is not None
+        is_geocentric = GEOCENTRIC_FORM.search(given) is not None
+        _refuse_zone(given)
     if not name:
         raise MeshError("point cloud", [f"crs: {EXPECTED}, got {given!r:.60}"])
     if is_degrees:
         raise MeshError("point cloud", [f"crs: {name} is in degrees, a map is in metres; project the points first"])
+    if is_geocentric:
+        text = f"crs: {name} has its origin in the earth's centre, where z is not up; project the points first"
+        raise MeshError("point cloud", [text])
     return name
+
+
+def _refuse_zone(given: str) -> None:
+    """Refuse a PROJ string of UTM whose zone there is not."""
+    match = ZONE_OF_PROJ.search(given)
+    zone = match and (match.group(1) or match.group(2))
+    if zone and not (zone.isdecimal() and 1 <= int(zone) <= 60):
+        raise MeshError("point cloud", [f"crs: expected a zone of UTM from 1 to 60, got {zone!r:.60}"])

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mbf_mesh_nav.building.clouds.coordinate_system import name_of_text
+from mbf_mesh_nav.building.clouds.coordinate_system import DEGREES_OF_TEXT, name_of_text
 from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, refuse_count
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
@@ -41,7 +41,8 @@ def read_las_points(path: Path, max_points: int) -> StoredPoints:
     Raises
     ------
     MeshError
-        laspy is not installed, the file is no LAS, cut off, has more than ``max_points`` points, or is in degrees.
+        laspy is not installed, the file is no LAS, cut off, has more than ``max_points`` points, is in degrees,
+        or its header turns no number into a coordinate.
     """
     if missing := [name for name in PACKAGES[path.suffix.lower()] if find_spec(name) is None]:
         raise MeshError(str(path), [f"needs {' and '.join(missing)}: pip install 'mbf-flex[maps]'"])
@@ -55,6 +56,7 @@ def read_las_points(path: Path, max_points: int) -> StoredPoints:
             header = reader.header
             count, size = int(header.point_count), int(header.point_format.size)
             refuse_count(path, count, max_points)
+            _refuse_scales(path, header)
             if not header.are_points_compressed:
                 found = (path.stat().st_size - int(header.offset_to_point_data)) // size
                 if found < count:
@@ -71,6 +73,15 @@ def read_las_points(path: Path, max_points: int) -> StoredPoints:
     dropped = count - int(is_kept.sum())
     notes = (f"{dropped} points are classified as noise or withheld",) if dropped else ()
     return StoredPoints(points[is_kept] if dropped else points, notes=notes, unit=unit, crs=_crs(text, keys))
+
+
+def _refuse_scales(path: Path, header: Any) -> None:
+    """Refuse a header by which no whole number becomes a coordinate."""
+    scales, offsets = np.asarray(header.scales, dtype=float), np.asarray(header.offsets, dtype=float)
+    if not (np.isfinite(scales).all() and (scales > 0.0).all()):
+        raise MeshError(str(path), [f"expected scales above 0 in its header, got {scales.tolist()}"])
+    if not np.isfinite(offsets).all():
+        raise MeshError(str(path), [f"expected finite offsets in its header, got {offsets.tolist()}"])
 
 
 def _refuse_cut_chunks(path: Path, points_begin: int, count: int) -> None:
@@ -122,7 +133,7 @@ def _crs(text: str, keys: dict[int, int]) -> str:
 
 def _unit(path: Path, text: str, keys: dict[int, int]) -> float:
     """Length [m] of the file's unit by its coordinate system, 0 if it states none."""
-    if keys.get(MODEL_TYPE) == GEOGRAPHIC or text.startswith("GEOGCS"):
+    if keys.get(MODEL_TYPE) == GEOGRAPHIC or DEGREES_OF_TEXT.match(text):
         raise MeshError(str(path), ["its coordinates are degrees; project them to metres first"])
     lengths = [float(length) for length in LENGTH_UNIT.findall(text)]
     if not lengths and keys.get(LINEAR_UNIT) in UNITS:

@@ -236,6 +236,7 @@ def _refuse_units(files: Sequence[Path], parts: Sequence[FloatArray], is_stated:
             f"{files[longest].name} is {extents[longest]:.6g} m long, {files[shortest].name} {extents[shortest]:.6g} m"
         )
         raise MeshError("point cloud", [f"the files have hardly the same unit: {text}"])
+    _refuse_far_apart(files, parts)
     lower = np.min([part.min(axis=0) for part in parts], axis=0)
     upper = np.max([part.max(axis=0) for part in parts], axis=0)
     length, height = float(max(upper[:2] - lower[:2])), float(upper[2] - lower[2])
@@ -250,6 +251,22 @@ def _refuse_units(files: Sequence[Path], parts: Sequence[FloatArray], is_stated:
     if length < SHORTEST:
         hint = "" if is_stated else "If its unit is not the metre, give it with --scale"
         raise MeshError(str(files[0]), [f"it is only {size}, too small for a map"], hint)
+
+
+def _refuse_far_apart(files: Sequence[Path], parts: Sequence[FloatArray]) -> None:
+    """Refuse a file that lies beyond ``LONGEST`` from every other one, as in another coordinate system."""
+    if len(parts) < 2:
+        return
+    lower = np.array([part[:, :2].min(axis=0) for part in parts])
+    upper = np.array([part[:, :2].max(axis=0) for part in parts])
+    for number, file in enumerate(files):
+        gaps = np.maximum(lower - upper[number], lower[number] - upper).max(axis=1)
+        gaps[number] = np.inf
+        nearest = int(np.argmin(gaps))
+        if gaps[nearest] > LONGEST:
+            text = f"{file.name} lies {gaps[nearest]:.6g} m from {files[nearest].name}, expected at most {LONGEST:g} m"
+            hint = "They have hardly the same coordinate system or unit"
+            raise MeshError("point cloud", [text], hint)
 
 
 def is_degrees(lower: FloatArray, upper: FloatArray) -> bool:

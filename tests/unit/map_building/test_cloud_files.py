@@ -23,6 +23,7 @@ from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 POINTS = np.round(np.random.default_rng(5).uniform((0, 0, 0), (30, 20, 4), (400, 3)), 3)
 UTM = np.array([498_765.0, 5_432_100.0, 0.0])
+EAST = np.array([1.0, 0.0, 0.0])
 WRITERS = {
     "little.ply": write_ply,
     "big.ply": lambda file, points: write_ply(file, points, "binary_big_endian"),
@@ -194,6 +195,22 @@ def test_a_las_header_that_promises_too_much_is_refused_unread(tmp_path):
     assert "the file is cut off: expected 1000000000 points, found 400" in refusal(file, max_points=2 * 10**9)
 
 
+@pytest.mark.parametrize(
+    ("place", "value", "text"),
+    [
+        (131, np.nan, "expected scales above 0 in its header, got [nan, 0.001, 0.001]"),
+        (139, 0.0, "expected scales above 0 in its header, got [0.001, 0.0, 0.001]"),
+        (163, np.inf, "expected finite offsets in its header, got [0.0, inf, 0.0]"),
+    ],
+)
+def test_a_las_header_without_sound_scales_is_refused(tmp_path, place, value, text):
+    file = write_las(tmp_path / "odd.las", POINTS)
+    content = bytearray(file.read_bytes())
+    content[place : place + 8] = np.float64(value).tobytes()
+    file.write_bytes(content)
+    assert text in refusal(file)
+
+
 def test_the_limit_is_on_all_files_together(tmp_path):
     files = [write_text(tmp_path / f"{number}.xyz", POINTS) for number in range(3)]
     with pytest.raises(MeshError, match=r"2.xyz: 400 points, the limit is 200"):
@@ -240,6 +257,16 @@ def test_files_of_different_units_are_refused(tmp_path):
     feet = 'PROJCS["a grid",UNIT["foot",0.3048]]'
     with pytest.raises(MeshError, match=r"different units \(m.xyz none, f.las 0.3048 m\); give one unit for all"):
         read_clouds([metres, write_las(tmp_path / "f.las", POINTS, well_known_text=feet)])
+
+
+def test_files_far_from_each_other_are_refused_by_name(tmp_path):
+    """One of them has another coordinate system, whatever unit they state."""
+    grid = 'PROJCS["a grid",UNIT["metre",1]]'
+    here, there = (write_las(tmp_path / f"{x}.las", POINTS + x * EAST, well_known_text=grid) for x in (0, 50_100))
+    with pytest.raises(MeshError, match=r"0.las lies 500\d\d.* m from 50100.las, expected at most 50000 m"):
+        read_clouds([here, there])
+    between = write_las(tmp_path / "between.las", POINTS + 25_000 * EAST, well_known_text=grid)
+    assert len(read_clouds([here, between, there]).points) == 3 * len(POINTS)
 
 
 @pytest.mark.parametrize(
@@ -300,15 +327,42 @@ def test_what_is_no_coordinate_system_is_refused_before_a_file_is_read(tmp_path,
     assert text.endswith(f"got {given!r}")
 
 
-@pytest.mark.parametrize("given", ["EPSG:4326", "+proj=longlat +datum=WGS84", 'GEOGCS["a globe",UNIT["degree",0.017]]'])
+@pytest.mark.parametrize(
+    "given",
+    [
+        "EPSG:4326",
+        "EPSG:7844",
+        "+proj=longlat +datum=WGS84",
+        'GEOGCS["a globe",UNIT["degree",0.017]]',
+        'COMPD_CS["a globe + heights",GEOGCS["a globe",UNIT["degree",0.017]],VERT_CS["heights",UNIT["metre",1]]]',
+    ],
+)
 def test_no_map_is_in_degrees(given):
     with pytest.raises(MeshError, match="is in degrees, a map is in metres"):
+        given_system(given)
+
+
+@pytest.mark.parametrize("given", ["EPSG:4978", "+proj=geocent +ellps=WGS84", 'GEOCCS["a globe",UNIT["metre",1]]'])
+def test_no_map_is_around_the_centre_of_the_earth(given):
+    with pytest.raises(MeshError, match="has its origin in the earth's centre, where z is not up"):
+        given_system(given)
+
+
+@pytest.mark.parametrize(
+    ("given", "zone"), [("+proj=utm +zone=99", "99"), ("+zone=0 +proj=utm", "0"), ("+proj=utm +zone=32N", "32N")]
+)
+def test_a_zone_that_there_is_not_is_refused(given, zone):
+    with pytest.raises(MeshError, match=f"crs: expected a zone of UTM from 1 to 60, got '{zone}'"):
         given_system(given)
 
 
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
+        (
+            'COMPD_CS["both",GEOGCS["a globe",UNIT["degree",0.017]],VERT_CS["b",UNIT["metre",1]]]',
+            "its coordinates are degrees",
+        ),
         ('GEOGCS["a globe",UNIT["degree",0.0174532925]]', "its coordinates are degrees"),
         (
             'COMPD_CS["both",PROJCS["a",UNIT["metre",1]],VERT_CS["b",UNIT["foot",0.3048]]]',

@@ -110,7 +110,7 @@ def test_a_failed_build_leaves_the_old_map_and_nothing_else(tmp_path):
     points = write_text(tmp_path / "line.xyz", np.linspace((0, 0, 0), (30, 10, 2), 500))
     done = run("map", "build", points, "--out", out)
     assert done.exit_code == 2
-    assert done.stderr == "error: point cloud: all of its points lie on one line in the plan view\n"
+    assert done.stderr == f"error: {points}: all of its points lie on one line in the plan view\n"
     assert out.read_bytes() == b"the old map"
     assert sorted(file.name for file in tmp_path.iterdir()) == ["line.xyz", "map.ply"]
 
