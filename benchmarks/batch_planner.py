@@ -24,11 +24,11 @@ import trimesh
 from PIL import Image
 from terrain_meshes import fractal_terrain
 
-from mbf_abstract.commands.standing_server import read_config_or_map, standing_server
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.batch_planner import BatchPlanner
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.server.standing_server import read_config_or_map, standing_server
 
 Ends = tuple[list[Pose], list[Pose]]
 BAR_ON_TWO = 1.8

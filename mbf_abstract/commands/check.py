@@ -54,9 +54,9 @@ def check(
 
 def check_config(file: Path, load: bool) -> Checked:
     """Check a configuration and, to ``load`` it, its maps and plugins; raises ConfigError with all findings."""
-    from mbf_abstract.commands.standing_server import standing_server
     from mbf_abstract.config.findings import ConfigError, Finding
     from mbf_abstract.server.factory import read_config
+    from mbf_abstract.server.standing_server import standing_server
 
     if file.is_dir():
         expected = "a configuration, a scenario, or a folder of tiles (mbf map tile)"

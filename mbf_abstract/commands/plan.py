@@ -54,9 +54,9 @@ def plan(
     from_place, to_place = parse_place(start, "--start"), parse_place(goal, "--goal")
     with readable_errors():
         from mbf_abstract.commands.plan_picture import draw_plan
-        from mbf_abstract.commands.standing_server import place_robot, read_config_or_map, standing_server
         from mbf_abstract.compiling.compilation import record_compilations
         from mbf_abstract.goals.goal_types import GetPathGoal
+        from mbf_abstract.server.standing_server import place_robot, read_config_or_map, standing_server
         from mbf_abstract.time.clock import wall_seconds
 
         cls, checked, notes = read_config_or_map(config, "" if unknown is None else unknown.value)

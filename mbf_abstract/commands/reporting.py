@@ -13,22 +13,6 @@ BAD_INPUT = 2
 TRACEBACK_VARIABLE = "MBF_TRACEBACK"
 
 
-def text_of(error: Exception) -> str:
-    """Return the text of an exception, its name where it has none; a line for each wrong parameter; file and reason."""
-    from pydantic import ValidationError
-
-    if isinstance(error, ValidationError):
-        wrong = [
-            (".".join(map(str, one["loc"])) or "parameters", one["msg"], one.get("input")) for one in error.errors()
-        ]
-        return "\n".join(f"{name}: {text[:1].lower()}{text[1:]}, got {value!r:.60}" for name, text, value in wrong)
-    if isinstance(error, OSError) and error.filename is not None and error.strerror:
-        return f"{error.filename}: {error.strerror}"
-    if isinstance(error, MemoryError):
-        return f"not enough memory for that: {error}".removesuffix(": ")
-    return str(error).strip() or type(error).__name__
-
-
 @contextmanager
 def readable_errors() -> Iterator[None]:
     """Turn every exception into a text and exit code 2; set the environment variable MBF_TRACEBACK=1 to see it all."""
@@ -39,7 +23,7 @@ def readable_errors() -> Iterator[None]:
     except Exception as error:
         if os.environ.get(TRACEBACK_VARIABLE):
             raise
-        from mbf_abstract.config.findings import ConfigError
+        from mbf_abstract.config.findings import ConfigError, text_of
 
         if isinstance(error, ConfigError):
             count = len(error.findings)

@@ -83,3 +83,19 @@ def suggest(word: str, known: Iterable[str]) -> str:
     """Return ``did you mean 'x'?`` with the closest known word, or an empty text if none is close."""
     matches = get_close_matches(word, list(known), n=1, cutoff=0.6)
     return f"did you mean {matches[0]!r}?" if matches else ""
+
+
+def text_of(error: Exception) -> str:
+    """Return the text of an exception, its name where it has none; a line for each wrong parameter; file and reason."""
+    from pydantic import ValidationError
+
+    if isinstance(error, ValidationError):
+        wrong = [
+            (".".join(map(str, one["loc"])) or "parameters", one["msg"], one.get("input")) for one in error.errors()
+        ]
+        return "\n".join(f"{name}: {text[:1].lower()}{text[1:]}, got {value!r:.60}" for name, text, value in wrong)
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{error.filename}: {error.strerror}"
+    if isinstance(error, MemoryError):
+        return f"not enough memory for that: {error}".removesuffix(": ")
+    return str(error).strip() or type(error).__name__

@@ -31,11 +31,11 @@ from mbf_abstract.goals.goal_types import (
 from mbf_abstract.goals.handle import AnyGoalHandle
 
 SAME_PLACE = 1.0
-"""A way around that was asked for less than this far away [m] was asked for here."""
+"""A detour that was asked for less than this far away [m] was asked for here."""
 TAKEN_PAUSE = 2.0
-"""For so long [s] a way around that was taken is driven before another one is asked for at the same place."""
+"""For so long [s] a detour that was taken is driven before another one is asked for at the same place."""
 SHORT_DETOUR = 5.0
-"""A way around is taken in any case if it is longer by no more than this [m]."""
+"""A detour is taken in any case if it is longer by no more than this [m]."""
 
 
 class ActionLeaf(Leaf):
@@ -196,7 +196,7 @@ class UpdatePath(GetPath):
 
 
 class Detour(UpdatePath):
-    """Plan around who stands on the path; fails where the way around is too long, or was asked for here just now.
+    """Plan around who stands on the path; fails where the detour is too long, or was asked for here just now.
 
     Where there was none worth taking there will be none soon, and one that was taken needs time to be driven. All
     nodes of a mission remember together, so the second planner and a recovery do not both ask.
@@ -204,7 +204,7 @@ class Detour(UpdatePath):
     Parameters
     ----------
     asked_again : float
-        After a way around that was not taken none is asked for at this place for so long [s].
+        After a detour that was not taken none is asked for at this place for so long [s].
     """
 
     def __init__(self, name: str, planner: str, slot: int, longest: float, refiner: str, asked_again: float) -> None:

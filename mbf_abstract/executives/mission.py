@@ -44,7 +44,7 @@ class MissionContext:
     failure : ActionResult, optional
         The last failure of planning, driving, a check or a watchdog; recoveries are picked by its code.
     detour_asked : tuple of Pose and float, optional
-        Where a way around was asked for last, and until when [s] it is not asked for again there.
+        Where a detour was asked for last, and until when [s] it is not asked for again there.
     stuck : StuckMonitor
         The trouble so far: whether the same failure comes again and again at one place.
     """

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from mbf_abstract.commands.standing_server import place_robot, read_config_or_map, standing_server
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.navigator import Navigator
+from mbf_abstract.server.standing_server import place_robot, read_config_or_map, standing_server
 from mbf_mesh_nav.arrays import BoolArray, FloatArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
 

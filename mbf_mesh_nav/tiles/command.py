@@ -32,8 +32,8 @@ def tile(
 ) -> None:
     """Cut a map into tiles, compute their layers and what it costs to pass them."""
     with readable_errors():
-        from mbf_abstract.commands.standing_server import read_config_text
         from mbf_abstract.server.factory import read_config
+        from mbf_abstract.server.standing_server import read_config_text
         from mbf_mesh_nav.map.height_error import with_height_error
         from mbf_mesh_nav.map.map_builder import MeshMapParameters, height_error_of
         from mbf_mesh_nav.server import BARE_MESH

@@ -14,11 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mbf_abstract.commands.reporting import text_of
-from mbf_abstract.commands.standing_server import standing_server
-from mbf_abstract.config.findings import ConfigError, Finding, KeyPath
+from mbf_abstract.config.findings import ConfigError, Finding, KeyPath, text_of
 from mbf_abstract.config.yaml_source import YamlDocument
 from mbf_abstract.server.factory import read_config
+from mbf_abstract.server.standing_server import standing_server
 from terrain.description.placeholders import fill_in
 from terrain.provenance.named_files import InputCopies
 from terrain.scenarios.environment import build_environment, with_noise

@@ -45,7 +45,9 @@ PLUGIN_ROOMS = {"planners", "controllers", "recoveries", "refiners"}
 ALGORITHM_ROOMS = PLUGIN_ROOMS | {"kernels", "layers", "execution", "actions"}
 UNSAFE_CALLS = {"yaml.load", "yaml.unsafe_load", "eval", "exec", "os.system"}
 MOST_MODULES = 16  # in a room at one level, its __init__ not counted
-MOST_LINES, MOST_LINES_OF_A_FUNCTION, MOST_LINES_OF_A_KERNEL = 400, 60, 100
+WANTED_LINES, MOST_LINES, MOST_LINES_OF_A_FUNCTION, MOST_LINES_OF_A_KERNEL = 250, 360, 60, 100
+LONG_FILES = Path(__file__).with_name("long_files.txt")
+"""Files from before the rule; nothing is added to them."""
 FILES = {
     file.relative_to(REPOSITORY).as_posix(): file
     for package in ALLOWED
@@ -164,7 +166,7 @@ def test_views_stay_out_of_algorithms():
 
 def test_sessions_and_scenarios_know_no_viewer_and_no_command():
     """Outputs are passed in by whoever runs them."""
-    outputs = ("terrain.viewer.", "terrain.commands.")
+    outputs = ("terrain.viewer.", "terrain.commands.", "mbf_abstract.commands.")
     assert_none(
         (name, line, module)
         for name in FILES
@@ -175,13 +177,19 @@ def test_sessions_and_scenarios_know_no_viewer_and_no_command():
 
 
 def test_plugins_know_no_server_no_action_and_no_other_plugin():
-    for name in FILES:
-        if name.split("/")[1] not in PLUGIN_ROOMS or name.endswith("__init__.py"):
-            continue
-        for module, line in imports(name):
-            parts = module.split(".")
-            plugin = parts[0] in ALLOWED and len(parts) > 2 and parts[1] in PLUGIN_ROOMS
-            assert not {"server", "actions"} & set(parts) and not plugin, f"{name}:{line} {module}"
+    assert_none(
+        (name, line, module)
+        for name in FILES
+        if name.split("/")[1] in PLUGIN_ROOMS and not name.endswith("__init__.py")
+        for module, line in imports(name)
+        if {"server", "actions"} & set(module.split(".")) or is_plugin(module)
+    )
+
+
+def is_plugin(module):
+    """Whether a module of ours lies in a room of plugins."""
+    parts = module.split(".")
+    return parts[0] in ALLOWED and len(parts) > 2 and parts[1] in PLUGIN_ROOMS
 
 
 def test_the_plain_packages_import_no_simulator_and_nothing_that_draws():
@@ -194,9 +202,16 @@ def test_the_plain_packages_import_no_simulator_and_nothing_that_draws():
     )
 
 
-def test_files_and_functions_stay_small():
-    long_files = {name: len(file.read_text("utf-8").splitlines()) for name, file in FILES.items()}
-    assert {name: lines for name, lines in long_files.items() if lines > MOST_LINES} == {}
+def test_files_have_at_most_250_lines_but_for_a_list_that_only_shrinks():
+    lengths = {name: len(file.read_text("utf-8").splitlines()) for name, file in FILES.items()}
+    listed = set(LONG_FILES.read_text("utf-8").split())
+    long = {name for name, lines in lengths.items() if lines > WANTED_LINES}
+    assert long - listed == set(), "longer than they may be: split them where they have two subjects"
+    assert listed - long == set(), f"short enough by now: take them off {LONG_FILES.name}"
+    assert {name: lines for name, lines in lengths.items() if lines > MOST_LINES} == {}
+
+
+def test_functions_stay_small():
     assert_none(
         (name, node.lineno, f"{node.name}: {length} lines") for name in FILES for node, length in long_functions(name)
     )

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from mbf_abstract.commands.standing_server import read_config_text, standing_server
 from mbf_abstract.server.announcer import Announcer
+from mbf_abstract.server.standing_server import read_config_text, standing_server
 from mbf_abstract.traffic.traffic import SharedChannel
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from mbf_abstract.commands.standing_server import read_config_text, standing_server
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
@@ -18,6 +17,7 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.batch_planner import BatchPlanner
 from mbf_abstract.server.plugin_host import ServerError
+from mbf_abstract.server.standing_server import read_config_text, standing_server
 from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.cancel import CancelToken

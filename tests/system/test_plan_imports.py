@@ -28,7 +28,7 @@ end_header
 OFFICE = Path(__file__).resolve().parents[2] / "terrain" / "data" / "office.yaml"
 LOOK = """
 import sys
-from mbf_abstract.commands.standing_server import read_config_or_map
+from mbf_abstract.server.standing_server import read_config_or_map
 from pathlib import Path
 read_config_or_map(Path(sys.argv[1]))
 print(*sorted({module.split(".")[0] for module in sys.modules if module.startswith("mbf_")}))

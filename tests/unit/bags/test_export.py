@@ -8,13 +8,13 @@ from rosbags.highlevel import AnyReader
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
-from mbf_abstract.commands.standing_server import StandingRobot
 from mbf_abstract.drive_log import DriveLog, LoggedScan, read_drive_log
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.view import GridView, MeshView
 from mbf_abstract.server.factory import read_config
+from mbf_abstract.server.standing_server import StandingRobot
 from mbf_abstract.session import NavigationSession
 from mbf_ros.bags.export import messages_of
 from mbf_ros.bags.reading import BagError

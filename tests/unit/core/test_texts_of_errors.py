@@ -3,7 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
-from mbf_abstract.commands.reporting import text_of
+from mbf_abstract.config.findings import text_of
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from mbf_abstract.commands.standing_server import standing_server
 from mbf_abstract.server.factory import read_config
+from mbf_abstract.server.standing_server import standing_server
 from mbf_mesh_nav.files.file_frames import FileFrame, file_frame, on_the_map
 from mbf_mesh_nav.files.mesh_io import read_mesh
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map, default_layers
