@@ -25,15 +25,25 @@ NOTABLE = {
 }
 FAULTS = {EventKind.FAULT, EventKind.QUARANTINE, EventKind.SINK_FAILED}
 LEFT_OUT = ("traceback", "goal_id")
+SENTENCES = ("message", "reason")
+WHOLE = {EventKind.STUCK: "message", EventKind.RECOVERY: "plugin"}
+"""Events of which one value says it all."""
 SHOWN = NOTABLE | {EventKind.GOAL_FINISHED, EventKind.GOAL_PAUSED, EventKind.GOAL_RESUMED, EventKind.CUSTOM}
+UNNAMED = {EventKind.CUSTOM, EventKind.INCIDENT, EventKind.STUCK}
+"""Events whose text says what they are."""
 REPLACED = "preempted by a new plan"  # message of exe_path's goal when the robot continues on a newer path
 
 
 def event_text(event: Event) -> str:
-    """Return the data of an event as ``key: value`` pairs; an incident as a sentence."""
+    """Return what an event says: its sentence where it has one, and the rest of its data as ``key: value`` pairs."""
     if event.kind is EventKind.INCIDENT:
         return _incident_text(event.data)
-    return ", ".join(f"{key}: {value}" for key, value in event.data.items() if key not in LEFT_OUT)
+    data = {key: value for key, value in event.data.items() if key not in LEFT_OUT}
+    if event.kind in WHOLE:
+        return str(data.get(WHOLE[event.kind], ""))
+    sentence = next((str(data.pop(key)) for key in SENTENCES if data.get(key)), "")
+    pairs = ", ".join(f"{key}: {value}" for key, value in data.items() if value != "")
+    return f"{sentence} ({pairs})" if sentence and pairs else sentence or pairs
 
 
 def _incident_text(data: Mapping[str, Any]) -> str:
@@ -67,8 +77,8 @@ def line_of(event: Event) -> Line:
         code = outcome if isinstance(outcome, int) else 0
         colour = NEITHER if outcome_name(code) == "CANCELED" else GOOD if is_success(code) else BAD
         return Line(event.time, event.source, outcome_text(code, str(event.data.get("message", ""))), colour)
-    what = "" if event.kind in (EventKind.CUSTOM, EventKind.INCIDENT) else event.kind.value.replace("_", " ")
-    text = " ".join(part for part in (what, event_text(event)) if part)
+    what = "" if event.kind in UNNAMED else event.kind.value.replace("_", " ")
+    text = ": ".join(part for part in (what, event_text(event)) if part)
     return Line(event.time, event.source, text, colour_of(event))
 
 

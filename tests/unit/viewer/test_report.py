@@ -85,4 +85,4 @@ def test_the_timeline_is_sound_svg_for_open_goals_too(office_recording, finished
 
     assert len([node for node in nodes if node.tag == "rect"]) == 5
     assert "move_base: BLOCKED_PATH, 0.00 s to 15.40 s" in titles or not finished
-    assert "3.00 s: velocity_gate: robot_stopped: reason: no command for 0.5 s" in titles
+    assert "3.00 s: velocity_gate: robot_stopped: no command for 0.5 s" in titles
