@@ -11,6 +11,7 @@ import pytest
 from tests.system.ros2.environments import JAZZY, KILTED, clean_variables, end_with_parent, free_domain
 
 PEERS = Path(__file__).parent / "peers"
+BRIEF_LEASE = {"FASTDDS_DEFAULT_PROFILES_FILE": str(PEERS / "brief_lease.xml")}
 WITHIN = 300.0  # s; nothing waits that long unless it fails
 ROBOT = """
 backend: costmap
@@ -125,8 +126,7 @@ class Client(Peer):
     """The client of ``peers/client.py``, or another one that takes the same kind of orders."""
 
     def __init__(self, folder, domain, logs, script="client.py"):
-        lease = str(PEERS / "client_lease.xml")
-        super().__init__(folder, domain, logs, str(PEERS / script), FASTDDS_DEFAULT_PROFILES_FILE=lease)
+        super().__init__(folder, domain, logs, str(PEERS / script), **BRIEF_LEASE)
         self._keys = 0
 
     def do(self, **order):
@@ -138,6 +138,10 @@ class Client(Peer):
     def meet(self):
         """Wait until the client sees a node."""
         self.wait(self.do(order="meet"), "ready")
+
+    def part(self):
+        """Wait until the client sees no node any more."""
+        self.wait(self.do(order="part"), "alone")
 
     def send(self, action, **fields):
         """Send a goal and wait until it is accepted; returns its key."""
@@ -200,7 +204,17 @@ class Trio:
 
     def start_node(self, *options):
         arguments = *self._options, *options, *self._node_arguments
-        self.node = self._start(Peer, str(PEERS / "node.py"), str(self.file), *arguments, folder=self._node_folder)
+        command = str(PEERS / "node.py"), str(self.file), *arguments
+        self.node = self._start(Peer, *command, folder=self._node_folder, **BRIEF_LEASE)
+
+    def kill_node(self):
+        """Kill the node, and wait until the client has noticed.
+
+        Until the lease of the killed node ends, its servers seem to be there. A client that takes them for those of a
+        new node sends its goal before it has discovered that one, and the goal is lost.
+        """
+        self.node.kill()
+        self.client.part()
 
     def start_client(self):
         self.client = self._start(Client, self._client, folder=self._client_folder)
@@ -222,8 +236,8 @@ class Trio:
         self.client.order({"order": "cancel", "key": goal})
         return self.client.wait(goal, "result")
 
-    def _start(self, kind, *arguments, folder=None):
-        peer = kind(folder or self._folder, self._domain, self._logs, *arguments)
+    def _start(self, kind, *arguments, folder=None, **variables):
+        peer = kind(folder or self._folder, self._domain, self._logs, *arguments, **variables)
         self._closing.callback(peer.end)
         return peer
 

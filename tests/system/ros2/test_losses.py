@@ -47,7 +47,7 @@ def test_goals_that_are_over_leave_nothing_behind(trio):
 def test_the_robot_stops_when_the_node_is_killed_and_a_new_node_takes_the_next_goal(trio):
     trio.drive()
     before = len(trio.robot.lines)
-    trio.node.kill()
+    trio.kill_node()
     stood = trio.robot.wait_until_it_stands(before)
     trio.start_node()
     trio.wait_until_ready()
@@ -93,7 +93,7 @@ def test_the_robot_is_stopped_when_the_client_of_its_goal_is_killed_and_the_next
 
 
 def test_the_goal_of_a_killed_client_goes_on_where_that_is_asked_for(trio):
-    trio.node.kill()
+    trio.kill_node()
     trio.start_node("--keep-goals")
     trio.wait_until_ready()
     target = trio.robot.x + 10.0

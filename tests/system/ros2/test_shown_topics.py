@@ -149,7 +149,7 @@ def test_a_costmap_is_published_as_a_whole_and_then_by_its_changes(trio, listene
 
 
 def test_a_mesh_is_published_with_its_costs_and_as_coloured_triangles(trio, listener):
-    trio.node.kill()
+    trio.kill_node()
     vertices, faces = heightfield_mesh(np.zeros((101, 101)), 0.2, 0.2)
     trimesh.Trimesh(vertices - [10.0, 10.0, 0.1], faces, process=False).export(trio.file.parent / "floor.ply")
     trio.file.write_text(MESH)

@@ -68,6 +68,13 @@ def meet(key):
     say(key=key, what="ready")
 
 
+def part(key):
+    """Wait until no server of an action is seen any more."""
+    while any(client.server_is_ready() for client in clients.values()):
+        time.sleep(0.1)
+    say(key=key, what="alone")
+
+
 def find(key, actions):
     """Wait for the servers of some actions."""
     for action in actions:
@@ -245,7 +252,7 @@ def take_orders():
 
 executor = SingleThreadedExecutor()
 executor.add_node(node)
-waiting = {"meet": meet, "find": find, "look": look}
+waiting = {"meet": meet, "part": part, "find": find, "look": look}
 latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 node.create_subscription(PoseStamped, "/simulator/goal", take_shown_goal, latched)
 orders = {
