@@ -43,19 +43,28 @@ class RosClock(WallClock):
         """Take the present ROS time [s]; to be called often, on one thread."""
         difference = ros_time - (self.epoch + self.now())
         if abs(difference) > CORRECTION:
-            self._move(difference, abs(difference) > JUMP)
+            self.epoch += difference
+        if abs(difference) > JUMP:
+            self._notify_of_jump(difference)
 
-    def _move(self, difference: float, is_jump: bool) -> None:
-        self.epoch += difference
-        for listener in self.on_jump if is_jump else ():
+    def stand_in(self, seconds: float, after: float) -> None:
+        """Do nothing: real time does not stand still."""
+
+    def _notify_of_jump(self, difference: float) -> None:
+        for listener in self.on_jump:
             listener(difference)
 
 
 class SimulatedRosClock(RosClock):
-    """Time that passes as ``follow`` is called with it. Waits end when simulated time has come so far."""
+    """Time that passes as ``follow`` is called with it. Waits end when simulated time has come so far.
+
+    Where ROS time stands still so does ours, unless ``stand_in`` lets it pass.
+    """
 
     def __init__(self, ros_time: float) -> None:
         self._elapsed, self._ros_time = 0.0, ros_time
+        self._real_time = WallClock()
+        self._moved = 0.0
         self._lock = threading.Lock()
         self._waiting: dict[object, tuple[float, _SimulatedCondition]] = {}
         super().__init__(ros_time)
@@ -81,11 +90,31 @@ class SimulatedRosClock(RosClock):
 
     def follow(self, ros_time: float) -> None:
         """Let time pass up to a ROS time [s]; one that lies back is a jump."""
-        passed, self._ros_time = ros_time - self._ros_time, ros_time
+        with self._lock:
+            passed, self._ros_time = ros_time - self._ros_time, ros_time
+            if passed != 0.0:
+                self._moved = self._real_time.now()
+            self.epoch += min(passed, 0.0)
+            self._elapsed += max(passed, 0.0)
         if passed < 0.0:
-            self._move(passed, is_jump=True)
-            return
-        self._elapsed += passed
+            self._notify_of_jump(passed)
+        else:
+            self._wake_those_due()
+
+    def stand_in(self, seconds: float, after: float) -> None:
+        """Let our time alone pass by ``seconds`` where ROS time has stood still for ``after`` [s of real time].
+
+        What has been asked to end then can: a grace runs out, a wait for the next control period ends. The epoch
+        moves back, so that what ROS stamps now is not old for us.
+        """
+        with self._lock:
+            if self._real_time.now() - self._moved < after:
+                return
+            self._elapsed += seconds
+            self.epoch -= seconds
+        self._wake_those_due()
+
+    def _wake_those_due(self) -> None:
         with self._lock:
             due = {condition for stamp, condition in self._waiting.values() if stamp <= self._elapsed}
         for condition in due:

@@ -116,7 +116,7 @@ class RobotNavigation(ABC):
     def _begin(self) -> None:
         """Watch the robot, and get ready for goals."""
         self._clock.on_jump.append(self._on_jump)
-        watch = Ticker(self._real_time, self.session.events, self._watch, WATCH_PERIOD, "silence watch")
+        watch = Ticker(self._real_time, self.session.events, self._look, WATCH_PERIOD, "silence watch")
         self._closing.callback(watch.stop)
         self._closing.callback(self._stop_serving)
         self._real_time.spawn(self._get_ready, "warm up")
@@ -155,6 +155,13 @@ class RobotNavigation(ABC):
         if self._ending.is_set():
             return f"the {self.name} ends"
         return "" if self._ready.is_set() else f"the {self.name} is not ready: {self.problem()}"
+
+    def _look(self) -> None:
+        """Watch the robot; where its time stands still, let time pass for goals that are to end."""
+        actions = self.session.navigator.server.actions
+        if any(handle.cancel_requested for action in actions for handle in action.unfinished):
+            self._clock.stand_in(WATCH_PERIOD, after=self._max_silence())
+        self._watch()
 
     def _watch(self) -> None:
         """Stop the robot where something fails to come."""

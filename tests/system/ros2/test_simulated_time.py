@@ -29,6 +29,16 @@ def test_a_robot_is_stopped_when_simulated_time_stops_and_goes_on_with_it(trio):
     assert trio.cancel(goal)["status"] == "canceled"
 
 
+def test_a_canceled_goal_ends_and_the_next_one_works_although_simulated_time_stood_still(trio):
+    goal = trio.drive()
+    before = len(trio.robot.lines)
+    trio.robot.set("clock", "off")
+    trio.robot.wait_for_speed(lambda speed: speed == 0.0, before)
+    assert trio.cancel(goal)["status"] == "canceled"
+    trio.robot.set("clock", "on")
+    assert trio.client.result("move_base", target=[0.5, 0.0]) == ("succeeded", MoveBaseOutcome.SUCCESS)
+
+
 def test_a_node_that_waits_for_simulated_time_ends_when_a_callback_raises(trio):
     trio.node.process.send_signal(signal.SIGINT)
     assert trio.node.wait_for_end() == 0

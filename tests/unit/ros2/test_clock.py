@@ -70,6 +70,21 @@ def test_a_thread_that_sleeps_wakes_after_simulated_seconds():
     assert time > 0.95
 
 
+def test_time_that_stands_in_ends_waits_and_leaves_ros_time_where_it_is():
+    clock, jumps = SimulatedRosClock(100.0), []
+    clock.on_jump.append(jumps.append)
+    clock.follow(101.0)
+    clock.stand_in(0.5, after=3600.0)
+    assert clock.now() == 1.0
+    thread = clock.spawn(lambda: clock.sleep_until(2.0), "sleeper")
+    clock.stand_in(1.5, after=0.0)
+    assert thread.join(60.0)
+    assert (clock.now(), clock.epoch + clock.now()) == (2.5, 101.0)
+    clock.follow(101.25)
+    assert (clock.now(), clock.epoch + clock.now()) == (2.75, 101.25)
+    assert jumps == []
+
+
 class SetClock(RosClock):
     """Shows the time that the test sets."""
 
