@@ -139,10 +139,10 @@ def paths_to_keep_free(begin: Pose, track: FloatArray, paths: Sequence[FloatArra
 def paths_beside(
     start: Pose, own: FloatArray, known: Iterable[TrackedObject], distance: float, same_storey: float
 ) -> Iterator[FloatArray]:
-    """Yield what to keep free, the best first: with the ways of who is tracked near the own path, then without.
+    """Yield what to keep free, the best first: with the paths of those who are tracked near the own one, then without.
 
     Who blocks the robot is taken to go parallel to the robot's path, through where it is now; on the path alone the
-    robot would stand beside its own way and in front of the other one.
+    robot would stand beside its own path and in front of the other one.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ NEAR = (0.2, 0.1)
 LOOKS_ALONG = 0.25 * math.pi
 """At most so far [rad] off the path's direction a robot creeps along it."""
 SMALL_TURN = 0.05
-"""By less than this [rad] no robot turns on the spot to make its way free."""
+"""By less than this [rad] no robot turns on the spot to clear its path."""
 SPACING, ARM = 0.05, 0.2
 """Distance [m] of the poses on a path; each looks along the line between the points ``ARM`` before and behind it."""
 WIDER = (0.5, 0.25, 0.0)

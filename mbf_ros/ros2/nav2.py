@@ -161,7 +161,7 @@ class ThroughPosesAction(Nav2Action):
         return more
 
     def _show_last(self, goal_handle: Any, handle: AnyGoalHandle, more: More) -> None:
-        """Publish where the robot is at the end, and what is left of the way: nothing for one that has arrived."""
+        """Publish where the robot is at the end, and what is left of the path: nothing for one that has arrived."""
         newest, result = handle.feedback, handle.result
         assert result is not None and self._mapping.feedback is not None
         with suppress(RobotStateError):

@@ -2,7 +2,7 @@
 
 Stamps of odometry serve a robot whose calendar is not ours. A message shows its stamp when it arrives, so the robot's
 time is at least that; of the messages of the last while the one with the least delay shows it best. By this estimate no
-odometry lies in the future, and all times are too early by the least delay of the way here. When the robot's calendar
+odometry lies in the future, and all times are too early by the least delay of the network. When the robot's calendar
 is set, messages go on to contradict the estimate, and it begins anew with them; one alone is a bad stamp.
 """
 

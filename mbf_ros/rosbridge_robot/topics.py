@@ -14,7 +14,7 @@ from mbf_ros.rosbridge.protocol import Operation, absolute, frame, text_in
 
 REPORT_PERIOD = 5.0  # s between two reports about messages of one topic
 CLOUDS = "sensor_msgs/PointCloud2"
-MAX_SKEW = 1.0  # s; more is not the way here but a calendar that is wrong
+MAX_SKEW = 1.0  # s; more is not the network but a calendar that is wrong
 BULKY = (CLOUDS, "sensor_msgs/LaserScan", "nav_msgs/OccupancyGrid", "map_msgs/OccupancyGridUpdate")
 """Types with long lists of numbers, some with infinities that JSON cannot say: asked for as CBOR."""
 

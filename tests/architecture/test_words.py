@@ -41,7 +41,7 @@ STANDARD = {  # banned word: the field's term
 }
 PHRASES = (
     *("point contact", "way out", "search room", "turned map", "upright map", "cut file", "ego sensor", "peer fact"),
-    *("a hair", "ready tree"),
+    *("a hair", "ready tree", "way around", "ways around", "ways through", "left of the way", "on its way on"),
 )
 ALLOWED_NAMES = {
     "str.strip": "strips blanks off a text",

@@ -1,4 +1,4 @@
-"""Fault table, row 24: goals on a mesh that cannot be reached, or need no way at all."""
+"""Fault table, row 24: goals on a mesh that cannot be reached, or need no path at all."""
 
 import numpy as np
 import pytest

@@ -7,10 +7,10 @@ seeds: both may give way at first, the waits they draw let one go on before the 
 Its path is the track that the robot has driven, straight ahead and straight on behind the track. The nearest place is
 searched where the base stands ``distance`` from all of it, by the shortest manoeuvre on which the outline touches
 nothing the map knows: back into a bay, around a corner, or a step aside in a hall; see ``maps.pull_out``. Who is
-tracked near its path is taken to go beside it, and that way is kept free, too, where there is such a place. The
+tracked near its path is taken to go beside it, and that path is kept free, too, where there is such a place. The
 manoeuvre is driven slowly, each command checked as in every recovery. Where a command is refused, the robot waits for
 ``PAUSE``, in which somebody who moves there stops or passes, and searches anew, ``ATTEMPTS`` times in all; afterwards
-it stands for a time that is drawn anew for each run, or until those who were tracked on its way have left it. Where
+it stands for a time that is drawn anew for each run, or until those who were tracked on its path have left it. Where
 there is no such place it ends with IMPASSABLE at once.
 
 Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
@@ -54,7 +54,7 @@ LOOKAHEAD = 0.25  # m to the point of the manoeuvre that is steered to
 ATTEMPTS, PAUSE = 4, 2.0  # to drive to a place; s between two of them
 WAIT_PERIOD = 0.5  # s between two looks at where the other robots are
 MOVED = 0.2  # m, of another robot that does not stand
-WAY_ON = 2.0  # m of its way on that must be clear of others before it ends its wait early
+AHEAD = 2.0  # m of its path ahead that must be clear of others before it ends its wait early
 MOST_WAITS = 3.0  # times longest_wait, for robots that move again and again
 END_REACHED, HEADING_REACHED = 0.04, 0.05  # m, rad
 NOT_THERE = frozenset([RecoveryOutcome.IMPASSABLE, RecoveryOutcome.PAT_EXCEEDED])
@@ -159,7 +159,7 @@ class GiveWayRecovery(GuardedRecovery):
         """Stand for a time [s]; less, where somebody is seen on the way that it left at ``begin``, and then nobody."""
         place, begun, seen, result = request.motion.pose(), self.clock.now(), False, RecoveryResult(0)
         while result.success and (left := begun + duration - self.clock.now()) > 0.0:
-            present = self._somebody_on_the_way(begin, place)
+            present = self._somebody_on_the_path(begin, place)
             if seen and not present:
                 break
             seen = seen or present
@@ -167,18 +167,18 @@ class GiveWayRecovery(GuardedRecovery):
         waited = f"waited {self.clock.now() - begun:.3g} s"
         return replace(result, message=waited) if result.success else result
 
-    def _somebody_on_the_way(self, begin: Pose, place: Pose) -> bool:
-        """Whether someone who is not parked is near the way from ``place`` back to ``begin`` and ``WAY_ON`` ahead."""
+    def _somebody_on_the_path(self, begin: Pose, place: Pose) -> bool:
+        """Whether someone who is not parked is near the path from ``place`` back to ``begin`` and ``AHEAD`` ahead."""
         back, here = self.on_map(begin), self.on_map(place)
         share = np.linspace(0.0, 1.0, 21)[:, None]
-        on = np.asarray(back.position) + share * back.rotation[:, 0] * WAY_ON
-        way = np.concatenate([np.asarray(here.position) + share * np.subtract(back.position, here.position), on])
+        on = np.asarray(back.position) + share * back.rotation[:, 0] * AHEAD
+        path = np.concatenate([np.asarray(here.position) + share * np.subtract(back.position, here.position), on])
         known = self.navigation_map.tracked_objects(self.clock.now())
         same_storey, near = self.navigation_map.same_storey, self.parameters.distance
         return any(
             one.motion is not Motion.PARKED
             and abs(one.z - back.z) < same_storey
-            and float(norm(way[:, :2] - (one.x, one.y)).min()) < near
+            and float(norm(path[:, :2] - (one.x, one.y)).min()) < near
             for one in known
         )
 

@@ -118,7 +118,7 @@ class _Change(NamedTuple):
         return react + math.hypot(*self._last(react)) / self.rate
 
     def travelled(self, times: FloatArray, react: float) -> tuple[FloatArray, FloatArray]:
-        """Both components (n,) of the way by some times (n,) [s]."""
+        """Both components (n,) of the displacement [m] after some times (n,) [s]."""
         duration, stopping = self._duration(), self.standstill(react) - react
         reacting, braked = np.minimum(times, react), np.clip(times - react, 0.0, stopping)
         changing = np.minimum(reacting, duration)

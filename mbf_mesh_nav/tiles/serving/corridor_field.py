@@ -6,8 +6,8 @@ on one mesh, and traces the path from where the robot is by then.
 
 What the search has shown of its corridor has to hold still. A plan is searched anew if it leads to another goal or may
 cost less above the cheapest, if it begins a portal's length or more beside the last path, if a tile has changed or left
-the memory, if sensed costs have changed outside of the corridor, and once changes have made the way longer by more than
-two corridors may differ by, or by more than the tolerance where that is less.
+the memory, if sensed costs have changed outside of the corridor, and once changes have made the path dearer by more
+than two corridors may differ by, or by more than the tolerance where that is less.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
 @dataclass(eq=False)
 class _Field:
-    """Distances (V,) [m] of the pool's vertices to a goal, the next vertices on the way, and what they are of.
+    """Distances (V,) [m] of the pool's vertices to a goal, the next vertices on the path, and what they are of.
 
-    ``risen`` is by how much changes have made the ways of the plans longer since the search [m], ``tolerance`` is that
+    ``risen`` is by how much changes have raised the costs of the plans since the search [m], ``tolerance`` is that
     of the search.
     """
 
@@ -118,7 +118,7 @@ class CorridorField:
         if not self._spread(field, graph, seeds, cancel_flag):
             return None
         field.sensed = self._tiled.sensed
-        # 3. Has the way become so much longer that another corridor may be better?
+        # 3. Has the path become so much dearer that another corridor may be better?
         cost = _cost_from(field, start)
         field.risen += max(0.0, cost - before) if np.isfinite(before) else np.inf
         if not np.isfinite(cost) or field.risen > min(STEADY, tolerance) * field.searched_cost:
@@ -172,6 +172,6 @@ class CorridorField:
 
 
 def _cost_from(field: _Field, start: TilePlace) -> float:
-    """Cost [m] of the way from a place; inf without one."""
+    """Cost [m] of the path from a place; inf without one."""
     corners = start.corners + field.firsts[start.key]
     return float((field.distances[corners] + start.corner_costs).min(initial=np.inf))

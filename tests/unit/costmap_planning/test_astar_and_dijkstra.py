@@ -170,7 +170,7 @@ def block_map():
     return cells
 
 
-def test_f160_theta_star_finds_a_way_around_the_block(make_plugin):
+def test_f160_theta_star_finds_a_path_around_the_block(make_plugin):
     result = plan(make_plugin(ThetaStarPlanner, block_map()), (5.5, 5.5), (18.5, 18.5))
     assert result.success and len(result.path) > 0
     assert result.path.length == pytest.approx(math.hypot(10, 1) + math.hypot(3, 12), abs=1e-3)

@@ -240,7 +240,7 @@ def test_the_inner_block_is_checked_like_any_other(tmp_path):
     assert [key for _, key, _ in findings_of(tmp_path, nested)] == ["shim.inner.inner.max_vel_x"]
 
 
-def test_the_shim_is_no_way_around_the_refusal_of_module_types(tmp_path):
+def test_the_shim_does_not_evade_the_refusal_of_module_types(tmp_path):
     name = "mbf_costmap_nav.controllers.dwa:DWAController"
     text = f'shim:\n  inner_type: "{name}"\nallow_module_types: false\n'
     ((line, key, message),) = findings_of(tmp_path, text)

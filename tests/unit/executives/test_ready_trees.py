@@ -178,7 +178,7 @@ def test_who_stands_is_planned_around_while_driving_if_parked_or_if_both_stand(
 @pytest.mark.parametrize(
     ("longer", "recovery"), [(4.0, []), (20.0, ["relax", "relax", "back_up", "relax"])], ids=["taken", "too long"]
 )
-def test_a_way_around_that_is_too_long_is_not_asked_for_again_at_once(
+def test_a_detour_that_is_too_long_is_not_asked_for_again_at_once(
     make_session, recoveries, monkeypatch, longer, recovery
 ):
     def around(request):

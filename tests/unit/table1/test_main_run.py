@@ -12,7 +12,7 @@ from terrain.experiments.table1.environments import traffic
 from terrain.experiments.table1.environments.traffic import CARRIER, HALF_WIDTH, Box, make_traffic, run_ahead
 from terrain.experiments.table1.main_run import buildings, conditions, run, table, trial
 from terrain.experiments.table1.main_run.conditions import CONDITIONS
-from terrain.experiments.table1.main_run.floor_plans import draw_world, has_ways_around
+from terrain.experiments.table1.main_run.floor_plans import draw_world, has_detours
 from terrain.experiments.table1.main_run.run import known_rows, run_missing, trials
 from terrain.experiments.table1.main_run.trial import Trial, hash_of_parameters, tally_of
 
@@ -29,7 +29,7 @@ def blocks(world):
 # ------------------------------------------------------------------------------------------------ floor plans
 def test_only_the_ring_leads_around_in_odd_plans_and_every_rack_of_the_middle_in_even_ones():
     for seed, world in enumerate(PLANS, start=100):
-        assert blocks(world) == (len(world.plan.furniture) // 3 if has_ways_around(seed) else 1)
+        assert blocks(world) == (len(world.plan.furniture) // 3 if has_detours(seed) else 1)
 
 
 def test_all_waypoints_and_routes_of_a_drawn_plan_are_free():

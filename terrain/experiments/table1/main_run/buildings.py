@@ -14,13 +14,13 @@ import numpy as np
 from mbf_abstract.geometry import Pose
 from terrain.experiments.table1.environments.world import WAREHOUSE, World, load_world
 from terrain.experiments.table1.main_run import floor_plans
-from terrain.experiments.table1.main_run.floor_plans import PlanarPoint, PlanarPose, draw_world, has_ways_around
+from terrain.experiments.table1.main_run.floor_plans import PlanarPoint, PlanarPose, draw_world, has_detours
 from terrain.worlds.occupancy import OccupancyGrid
 
 HEAD_START = (30.0, 240.0)  # s; for so long the others have been driving when a run begins
 HEAD_START_STREAM = 5  # beside the streams of the environment and of the floor plans
 LEGS = 3  # of the six waypoints of a world a seed drives the first three or the last three
-WITH, WITHOUT = "with ways around", "without"
+WITH, WITHOUT = "with detours", "without"
 
 
 def head_start(seed: int) -> float:
@@ -67,15 +67,15 @@ class Building:
     ----------
     world : callable
         The world of a seed; the same for all seeds but in a family.
-    ways_around : callable
-        Whether there are ways around on a seed.
+    detours : callable
+        Whether a seed has detours: other routes where one is blocked.
     constants : mapping
         What the worlds are drawn from; empty where nothing is drawn.
     """
 
     name: str
     world: Callable[[int], World]
-    ways_around: Callable[[int], bool]
+    detours: Callable[[int], bool]
     constants: Mapping[str, Any]
 
     def half_round(self, seed: int) -> HalfRound:
@@ -93,7 +93,7 @@ class Building:
 
     def group(self, seed: int) -> str:
         """Name of the rows of a seed in the table."""
-        return f"{self.name}, {WITH if self.ways_around(seed) else WITHOUT}"
+        return f"{self.name}, {WITH if self.detours(seed) else WITHOUT}"
 
 
 def buildings(depot: Path | None) -> dict[str, Building]:
@@ -108,10 +108,10 @@ def buildings(depot: Path | None) -> dict[str, Building]:
     if depot is not None:
         found.append(_fixed("depot", depot, True))
     constants = {name: getattr(floor_plans, name) for name in dir(floor_plans) if name.isupper()}
-    found.append(Building("plans", draw_world, has_ways_around, json.loads(json.dumps(constants))))
+    found.append(Building("plans", draw_world, has_detours, json.loads(json.dumps(constants))))
     return {building.name: building for building in found}
 
 
-def _fixed(name: str, file: Path, ways_around: bool) -> Building:
+def _fixed(name: str, file: Path, detours: bool) -> Building:
     world = load_world(file)
-    return Building(name, lambda seed: world, lambda seed: ways_around, {})
+    return Building(name, lambda seed: world, lambda seed: detours, {})

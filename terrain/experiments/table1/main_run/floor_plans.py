@@ -1,8 +1,8 @@
-"""A family of floor plans drawn from a seed: rows of racks, two cross aisles, bays; with or without ways around.
+"""A family of floor plans drawn from a seed: rows of racks, two cross aisles, bays; with or without detours.
 
 All members have a ring, of the first and the last aisle and the two cross aisles, on which the others drive. Outside
-of the ring the aisles are bays with one mouth. Inside of it they are ways through, or bays as well where a rack closes
-their middle: then nothing but the ring leads anywhere. Even seeds have ways around, odd ones do not.
+of the ring the aisles are bays with one mouth. Inside of it they can be driven through, or are bays as well where a
+rack closes their middle: then nothing but the ring leads anywhere. Even seeds have detours, odd ones do not.
 
 All numbers of a plan are drawn whether they are used or not, so both kinds look alike.
 """
@@ -76,8 +76,8 @@ class Measures:
         return 0.5 * (self.ys[::2][number] + self.ys[1::2][number])
 
 
-def has_ways_around(seed: int) -> bool:
-    """Whether the plan of a seed has ways around."""
+def has_detours(seed: int) -> bool:
+    """Whether the plan of a seed has detours."""
     return seed % 2 == 0
 
 
@@ -87,7 +87,7 @@ def draw_world(seed: int) -> DrawnWorld:
     measures = _measures(rng)
     waypoints = _waypoints(measures, rng)
     mirrored = bool(rng.random() < 0.5)
-    racks = _racks(measures, has_ways_around(seed))
+    racks = _racks(measures, has_detours(seed))
     width, height = measures.xs[-1] + WALL, measures.ys[-1] + WALL
     routes = _routes(measures)
     if mirrored:
@@ -122,11 +122,11 @@ def _edges(lengths: FloatArray | list[float]) -> tuple[float, ...]:
     return tuple((WALL + 0.05 * np.concatenate([[0], np.cumsum(cells)])).round(2).tolist())
 
 
-def _racks(measures: Measures, ways_around: bool) -> list[Rectangle]:
+def _racks(measures: Measures, detours: bool) -> list[Rectangle]:
     xs, ys = measures.xs, measures.ys
     blocks = list(zip(xs[::2], xs[1::2], strict=True))
     racks = [Rectangle(begin, y0, end, y1) for begin, end in blocks for y0, y1 in measures.racks]
-    if not ways_around:
+    if not detours:
         middle = 0.5 * (xs[2] + xs[3])
         racks.append(Rectangle(middle - 0.5 * CLOSING_RACK, ys[1], middle + 0.5 * CLOSING_RACK, ys[-2]))
     return racks

@@ -47,7 +47,7 @@ class ConditionResult:
 
 
 def grouped(rows: Rows, depot: Path | None) -> dict[str, Tallies]:
-    """Tallies of the seeds that all conditions have driven, by building, with or without ways around."""
+    """Tallies of the seeds that all conditions have driven, by building, with or without detours."""
     known = buildings(depot)
     by_place: dict[tuple[str, int], dict[str, Tally]] = {}
     for trial, row in rows.items():
