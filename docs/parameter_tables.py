@@ -48,7 +48,8 @@ the server is made.
 Change values while the server runs by a call, all of its values or none: `server.set_parameters(...)`,
 `server.set_plugin_parameters(kind, name, ...)`, and on every map `set_map_parameters("local_costmap", max_age=1.0)`,
 `set_layer_parameters("global_costmap.inflation", inflation_radius=0.8)` and `set_footprint(...)` with corners or the
-radius of a round robot (on a mesh: a radius). The map shows it after its next update.
+radius of a round robot (on a mesh: a radius, and the radii of its layers change by as much). The map shows it after its
+next update.
 """
 
 BACKENDS = {

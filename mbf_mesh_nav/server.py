@@ -92,7 +92,7 @@ class MeshNavigationServer(MapServer):
         self._report_findings()
 
     def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
-        """The radius of the disc that stands for the robot; inflation layers have radii of their own."""
+        """The radius of the disc that stands for the robot; the radii of layers change by as much."""
         return changes_of_radius(footprint)
 
     def swap_mesh(self, mesh_file: Path | str) -> None:

@@ -76,7 +76,8 @@ def find_valid_pose(
     comes first, then growing turns to the left and right. If the heading stays, the orientation is returned as given.
 
     The answer is FREE or INSCRIBED with a pose that fits; UNKNOWN or OUTSIDE with the nearest pose that only touches
-    unknown cells or the border; or LETHAL without a pose. Its cost is the highest one under the footprint.
+    unknown cells or the border; or, without a pose, LETHAL, or OUTSIDE for a pose off the map. Its cost is the highest
+    one under the footprint.
 
     Parameters
     ----------
@@ -93,7 +94,8 @@ def find_valid_pose(
     outline = footprint.offset(query.safety_dist)
     vertices = outline.vertices if len(outline.vertices) >= 3 else np.zeros((1, 2))
     lower_left = np.array([costmap.origin_x, costmap.origin_y])
-    second_best = PoseAnswer(CellState.LETHAL, float(LETHAL), None)
+    nothing_fits = CellState.LETHAL if costmap.contains(pose.x, pose.y) else CellState.OUTSIDE
+    second_best = PoseAnswer(nothing_fits, float(LETHAL), None)
     for candidates in _candidates(costmap, pose, dist_tolerance):
         places = (candidates - lower_left) / costmap.resolution
         which, turn, state, cost = first_fitting_pose(

@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import model_validator
 
 from mbf_abstract.maps.layers.inflation import InflationRadii
-from mbf_abstract.parameters import parameter
+from mbf_abstract.parameters import parameter, with_changes
 from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.kernels.layers.inflation import repair_distances, set_fading_costs, update_sources
 from mbf_mesh_nav.map.layer import CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
@@ -48,6 +48,12 @@ class InflationParameters(LayerParameters, InflationRadii):
                 f"robot's body touches would be free, got {self.inflation_radius:g} m"
             )
         return self
+
+    def for_radius(self, old: float, new: float) -> InflationParameters:
+        """Both radii grow or shrink by as much as the robot, so its costs fall off over the same distance."""
+        change = new - (old or self.inscribed_radius)
+        radii = {name: getattr(self, name) + change for name in ("inscribed_radius", "inflation_radius")}
+        return with_changes(self, radii)
 
     def relaxed(self, factor: float, robot_radius: float) -> InflationParameters:
         """As of all inflations; the layer's own inscribed radius shrinks too, to that of the robot at most."""

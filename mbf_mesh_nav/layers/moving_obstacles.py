@@ -33,7 +33,7 @@ from mbf_abstract.maps.tracking.moving_obstacles import (
     predicted_places,
 )
 from mbf_abstract.maps.tracking.objects import TrackedObject
-from mbf_abstract.parameters import parameter
+from mbf_abstract.parameters import parameter, with_changes
 from mbf_mesh_nav.arrays import FloatArray, IntArray, sorted_once
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 from mbf_mesh_nav.map.layer import (
@@ -61,6 +61,10 @@ class MovingObstaclesLayerParameters(LayerParameters, MovingObstaclesParameters)
     inscribed_radius: float = parameter(
         0.3, "Added to the radius of objects: that of the robot's inner circle.", unit="m", ge=0.0, le=10.0
     )
+
+    def for_radius(self, old: float, new: float) -> MovingObstaclesLayerParameters:
+        """The radius grows or shrinks by as much as the robot."""
+        return with_changes(self, {"inscribed_radius": self.inscribed_radius + new - (old or self.inscribed_radius)})
 
 
 class MovingObstaclesLayer(TrackingLayer, MeshLayer):

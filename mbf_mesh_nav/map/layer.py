@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,13 @@ class LayerParameters(map_layer.LayerParameters):
     """Parameters every mesh layer has."""
 
     combination_weight: float = parameter(1.0, "Weight of this layer in a weighted sum or mean.", ge=0.0, le=10.0)
+
+    def for_radius(self, old: float, new: float) -> Self:
+        """Return these for a robot whose inscribed radius [m] changes; themselves where the layer knows no robot.
+
+        ``old`` is that of the map, 0 = unknown. Raises ValueError where they would not be legal.
+        """
+        return self
 
 
 @dataclass(frozen=True, eq=False)

@@ -245,6 +245,7 @@ class MeshMap(SnapshotAnswers):
 
     def take_parameters(self, parameters: Any) -> None:
         """Take over ``edge_cost_factor``, ``inscribed_radius`` and ``footprint`` of ``MeshMapParameters``."""
+        self.fit_layers(parameters.inscribed_radius)
         if parameters.edge_cost_factor != self.edge_cost_factor:
             self.set_edge_cost_factor(parameters.edge_cost_factor)
         self.inscribed_radius, self.footprint = parameters.inscribed_radius, parameters.footprint

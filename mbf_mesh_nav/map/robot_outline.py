@@ -42,7 +42,7 @@ class OutlineParameters(ParameterModel):
 def changes_of_radius(footprint: object) -> dict[str, Any]:
     """Changes of these parameters for a disc of a radius [m]; ValueError for anything but a number."""
     if not isinstance(footprint, int | float):
-        raise ValueError(f"a mesh map takes the robot for a disc: a radius [m], not {footprint!r}")
+        raise ValueError(f"a mesh map treats the robot as a disc: expected a radius [m], not {footprint!r}")
     return {"inscribed_radius": footprint, "footprint": ()}
 
 
@@ -56,6 +56,29 @@ class OutlinedMap(LayeredMap):
     """
 
     footprint: Corners = ()
+
+    def fit_layers(self, radius: float) -> None:
+        """Give the layers that know the robot its new inscribed radius [m], before the map takes it; 0 = unknown.
+
+        Raises
+        ------
+        ValueError
+            A layer cannot have it; none is changed.
+        """
+        old = self.inscribed_radius
+        if radius in (0.0, old):
+            return
+        usual = {name: self.usual_parameters(name) for name in self.layers}
+        fitted = {name: one.for_radius(old, radius) for name, one in usual.items()}
+        changed: list[str] = []
+        try:
+            for name in (name for name in usual if fitted[name] is not usual[name]):
+                self.set_layer_parameters(name, fitted[name])
+                changed.append(name)
+        except BaseException:
+            for name in changed:
+                self.set_layer_parameters(name, usual[name])
+            raise
 
     @property
     def robot_box(self) -> RobotBox:

@@ -67,7 +67,12 @@ def arrives_wherever_it_is_near(server):
         )
 
 
+def keeps_the_radius_of_its_layers(server):
+    server.set_footprint = lambda footprint: None
+
+
 FAULTS = {
+    keeps_the_radius_of_its_layers: {"a_robot_that_grows_no_longer_fits", "a_bad_change_changes_nothing"},
     ignores_silence: {
         "a_silent_sensor_holds_the_robot_while_it_drives",
         "a_sensor_that_stays_silent_ends_the_path_with_map_error",

@@ -13,11 +13,13 @@ import numpy as np
 from mbf_abstract.geometry import FloatArray, Path, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.graph.graph_map import BoolArray, GraphMap
-from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult
 
 START, GOAL = GetPathOutcome.BLOCKED_START, GetPathOutcome.BLOCKED_GOAL
+OFF_GROUND = 0.5
+"""A pose farther above or below the ground [m] is not on it."""
 
 
 class GraphPlanner(AbstractPlanner):
@@ -56,8 +58,9 @@ class GraphPlanner(AbstractPlanner):
     def _ends(self, pose: Pose, tolerance: float, free: BoolArray) -> Any:
         """Free nodes at a pose: the nearest one, then the others within the tolerance [m] in order of distance."""
         own = self._map.node_at(pose.x, pose.y)
-        itself = np.array([own] if own >= 0 and free[own] else [], dtype=np.intp)
-        if own < 0 or tolerance == 0.0:
+        on_ground = own >= 0 and abs(pose.z - self._map.nodes[own, 2]) <= OFF_GROUND
+        itself = np.array([own] if on_ground and free[own] else [], dtype=np.intp)
+        if tolerance == 0.0:
             return itself
         gaps = norm(self._map.nodes - np.asarray(pose.position))
         near = np.flatnonzero(free & (gaps <= tolerance))
@@ -66,8 +69,11 @@ class GraphPlanner(AbstractPlanner):
     def _refused(self, pose: Pose, name: str) -> PlanResult:
         answer = self._map.place(pose.x, pose.y)
         place = f"the {name} ({pose.x:.2f}, {pose.y:.2f})"
-        if self._map.node_at(pose.x, pose.y) < 0:
+        if (node := self._map.node_at(pose.x, pose.y)) < 0:
             return PlanResult(GetPathOutcome.OUT_OF_MAP, f"there is no ground at {place}")
+        if (gap := abs(pose.z - self._map.nodes[node, 2])) > OFF_GROUND:
+            text = f"{place} is {gap:.2f} m from the ground, allowed are {OFF_GROUND:g} m"
+            return PlanResult(GetPathOutcome.OUT_OF_MAP, text)
         return PlanResult(START if name == "start" else GOAL, f"{place} is {answer.state.name}, cost {answer.cost:.2f}")
 
     def _graph(self, free: BoolArray) -> Any:

@@ -78,6 +78,9 @@ def a_valid_pose_is_the_nearest_one(site: Site) -> None:
         site.expect(answer.state <= CellState.INSCRIBED, f"asked about {name} it returns {answer.state.name}")
     site.expect(none.pose is None, f"within 0.1 m of the wall it found {none.pose}")
     site.expect(none.state >= CellState.LETHAL, f"where nothing fits it returns {none.state.name}")
+    outside = find(somewhere(40.0, 4.0), 1.0, 0.0)
+    site.expect(outside.pose is None, f"metres off the ground it found {outside.pose}")
+    site.expect(outside.state is CellState.OUTSIDE, f"metres off the ground it returns {outside.state.name}")
     site.expect_raises(ValueError, lambda: find(AWAY, -1.0, 0.0), "a negative tolerance")
 
 

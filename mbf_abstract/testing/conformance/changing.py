@@ -9,10 +9,11 @@ from typing import Any
 from mbf_abstract.geometry import Path
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.maps.queries import CellState
-from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.conformance.planning import FACE, WALL
+from mbf_abstract.testing.conformance.rig import ROBOT_RADIUS, Box
 from mbf_abstract.testing.conformance.site import Site, situation
 
 
@@ -31,6 +32,22 @@ def limits_change_while_driving(site: Site) -> None:
     site.expect_outcome(handle.wait(60.0), ExePathOutcome.SUCCESS)
 
 
+@situation(controller_max_retries=0)
+def a_robot_that_grows_no_longer_fits(site: Site) -> None:
+    """A larger footprint counts at once: beside an obstacle the drive ends with BLOCKED_PATH, without a contact."""
+    site.place(Box(5.0, 4.5, 5.4, 5.0))
+    handle = site.navigator.send(ExePathGoal(site.path((2.0, 4.0), (8.0, 4.0))))
+    site.expect_moves(1.0, "before it grows")
+    site.server.set_footprint(0.7)
+    site.expect_outcome(handle.wait(60.0), ExePathOutcome.BLOCKED_PATH)
+    gap = site.rig.least_gap()
+    site.expect(gap > 0.6, f"the robot's centre came to {gap:.2f} m from an obstacle")
+    site.server.set_footprint(ROBOT_RADIUS)
+    pose = site.rig.robot.pose
+    result = site.navigator.exe_path(site.path((pose.x, pose.y), (pose.x, 4.0), (8.0, 4.0)))
+    site.expect_outcome(result, ExePathOutcome.SUCCESS)
+
+
 @situation()
 def a_bad_change_changes_nothing(site: Site) -> None:
     """A value that is not legal is a ValueError and changes nothing; an unknown plugin is a ServerError."""
@@ -44,6 +61,11 @@ def a_bad_change_changes_nothing(site: Site) -> None:
             set_parameters(PluginKind.RECOVERY, name, duration=duration)
 
         site.expect_raises(error, change, f"duration {duration:g} of {name!r}")
+    site.expect_raises(ValueError, lambda: server.set_footprint(-1.0), "a footprint of -1 m")
+    site.expect_raises(ServerError, lambda: server.set_layer_parameters("unknown", enabled=True), "an unknown layer")
+    site.expect_raises(ServerError, lambda: server.set_map_parameters("unknown", max_age=1.0), "an unknown map")
+    bad = site.navigator.recover("wait", parameters={"duration": -1.0})
+    site.expect_outcome(bad, RecoveryOutcome.FAILURE, "'wait'", "duration")
     site.expect_outcome(site.navigator.exe_path(site.path((2.0, 4.0), (3.0, 4.0))), ExePathOutcome.SUCCESS)
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+from mbf_abstract.geometry import Path
 from mbf_abstract.goals.goal_area import DiscArea
 from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseFeedback, MoveBaseGoal
-from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
-from mbf_abstract.testing.conformance.rig import START, Box
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
+from mbf_abstract.testing.conformance.rig import START, Box, T_map_dock
 from mbf_abstract.testing.conformance.site import Site, situation, somewhere
 
 CORNERS = ((2.0, 4.0), (5.0, 4.0), (5.0, 6.0), (2.0, 6.0), (2.0, 4.0))
@@ -95,11 +97,64 @@ def a_wide_tolerance_ends_the_drive_early(site: Site) -> None:
 @situation()
 def a_path_in_an_unknown_frame_is_a_tf_error(site: Site) -> None:
     """A path in an unknown frame, or a pose to go to, ends with TF_ERROR and the name of the frame."""
-    from dataclasses import replace
-
     path = replace(site.path((2.0, 4.0), (5.0, 4.0)), frame_id="nowhere")
     site.expect_outcome(site.navigator.exe_path(path), ExePathOutcome.TF_ERROR, "nowhere")
     site.expect_outcome(site.navigator.go_to(somewhere(5.0, 4.0, "nowhere")), MoveBaseOutcome.TF_ERROR, "nowhere")
+
+
+@situation()
+def a_path_in_another_frame_is_driven(site: Site) -> None:
+    """A path in another known frame is driven, and its result is in the frame of the map."""
+    result = site.navigator.exe_path(T_map_dock.inverse().apply_to_path(site.path((2.0, 4.0), (4.0, 4.0))))
+    site.expect_outcome(result, ExePathOutcome.SUCCESS)
+    site.expect_near(4.0, 4.0, 0.25, "arrived")
+    frame = None if result.final_pose is None else result.final_pose.frame_id
+    site.expect(frame == "map", f"the final pose is in the frame {frame!r}")
+
+
+@situation()
+def a_path_without_poses_is_invalid(site: Site) -> None:
+    """A path without poses ends with INVALID_PATH; one of a single pose is driven to."""
+    site.expect_outcome(site.navigator.exe_path(Path.from_poses([])), ExePathOutcome.INVALID_PATH, "no poses")
+    single = Path.from_poses([somewhere(2.8, 4.0)])
+    site.expect_outcome(site.navigator.exe_path(single), ExePathOutcome.SUCCESS)
+    site.expect_near(2.8, 4.0, 0.25, "arrived")
+
+
+@situation(controller_max_retries=0)
+def a_path_far_from_the_robot_is_missed(site: Site) -> None:
+    """A path that begins metres away from the robot ends with MISSED_PATH, and the robot does not move."""
+    result = site.navigator.exe_path(site.path((8.0, 6.0), (10.0, 6.0)))
+    site.expect_outcome(result, ExePathOutcome.MISSED_PATH, "6.32 m")
+    site.expect_near(START.x, START.y, 0.05, "the path is elsewhere")
+
+
+@situation()
+def a_robot_that_ignores_its_commands_is_stuck(site: Site) -> None:
+    """A robot that does not follow its commands ends the path with ROBOT_STUCK."""
+    site.rig.robot.stuck = True
+    site.expect_outcome(site.navigator.exe_path(site.path((2.0, 4.0), (5.0, 4.0))), ExePathOutcome.ROBOT_STUCK)
+
+
+@situation()
+def plugins_that_are_not_loaded_are_named(site: Site) -> None:
+    """A goal for a plugin that is not loaded ends with INVALID_PLUGIN, its name and the names that are loaded."""
+    path, name = site.path((2.0, 4.0), (5.0, 4.0)), "'nobody'; loaded: "
+    site.expect_outcome(
+        site.navigator.get_path(somewhere(5.0, 4.0), planner="nobody"), GetPathOutcome.INVALID_PLUGIN, name
+    )
+    site.expect_outcome(site.navigator.exe_path(path, controller="nobody"), ExePathOutcome.INVALID_PLUGIN, name)
+    site.expect_outcome(site.navigator.recover("nobody"), RecoveryOutcome.INVALID_PLUGIN, name, "back_up")
+
+
+@situation(controller_patience=1.0)
+def one_controller_drives_one_path(site: Site) -> None:
+    """A path in another slot waits for the controller that drives and ends with PAT_EXCEEDED; the drive goes on."""
+    first = site.navigator.send(ExePathGoal(site.path((2.0, 4.0), (6.0, 4.0))))
+    site.rig.clock.sleep(0.5)
+    second = site.navigator.exe_path(site.path((2.0, 4.0), (3.0, 4.0)), concurrency_slot=1)
+    site.expect_outcome(second, ExePathOutcome.PAT_EXCEEDED, "uses")
+    site.expect_outcome(first.wait(60.0), ExePathOutcome.SUCCESS)
 
 
 @situation()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbf_abstract.geometry import Path
+from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_area import DiscArea
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import GetPathOutcome
@@ -62,7 +62,7 @@ def a_goal_inside_walls_is_not_found(site: Site) -> None:
 def a_blocked_goal_is_named(site: Site) -> None:
     """A goal on an obstacle ends with BLOCKED_GOAL if the path must end exactly there."""
     site.place(WALL)
-    site.expect_outcome(site.navigator.get_path(FACE, dist_tolerance=0.0), GetPathOutcome.BLOCKED_GOAL)
+    site.expect_outcome(site.navigator.get_path(FACE, dist_tolerance=0.0), GetPathOutcome.BLOCKED_GOAL, "goal (4.00")
 
 
 @situation()
@@ -70,20 +70,37 @@ def a_blocked_start_is_named(site: Site) -> None:
     """A start on an obstacle ends with BLOCKED_START."""
     site.place(WALL)
     plan = site.navigator.get_path(somewhere(7.0, 2.0), start_pose=FACE)
-    site.expect_outcome(plan, GetPathOutcome.BLOCKED_START)
+    site.expect_outcome(plan, GetPathOutcome.BLOCKED_START, "start (4.00")
 
 
 @situation()
-def a_goal_off_the_ground_is_refused(site: Site) -> None:
-    """A goal where there is no ground gets no path."""
-    plan = site.navigator.get_path(somewhere(40.0, 4.0))
-    refused = {
-        GetPathOutcome.OUT_OF_MAP,
-        GetPathOutcome.INVALID_GOAL,
-        GetPathOutcome.BLOCKED_GOAL,
-        GetPathOutcome.NO_PATH_FOUND,
-    }
-    site.expect(plan.outcome in refused, f"expected OUT_OF_MAP or alike, got {plan.outcome_name}: {plan.message}")
+def a_pose_off_the_ground_is_out_of_map(site: Site) -> None:
+    """A start, via pose or goal where there is no ground ends with OUT_OF_MAP and the name of the pose."""
+    plan, away = site.navigator.get_path, somewhere(40.0, 4.0)
+    site.expect_outcome(plan(away), GetPathOutcome.OUT_OF_MAP, "goal (40.00, 4.00")
+    site.expect_outcome(plan(somewhere(5.0, 4.0), start_pose=away), GetPathOutcome.OUT_OF_MAP, "start (40.00, 4.00")
+    site.expect_outcome(plan(somewhere(5.0, 4.0), via=(away,)), GetPathOutcome.OUT_OF_MAP, "via pose 1 (40.00, 4.00")
+    site.expect_outcome(site.navigator.go_to(away), GetPathOutcome.OUT_OF_MAP, "goal (40.00, 4.00")
+    site.expect_near(START.x, START.y, 0.05, "there was nowhere to go")
+
+
+@situation()
+def a_tolerance_reaches_past_the_border(site: Site) -> None:
+    """A goal past the border of the ground is approached to within its tolerance, and not without one."""
+    past = somewhere(12.4, 4.0)
+    site.expect_outcome(site.navigator.get_path(past, dist_tolerance=0.0), GetPathOutcome.OUT_OF_MAP)
+    plan = site.navigator.get_path(past, dist_tolerance=1.0)
+    site.expect_outcome(plan, GetPathOutcome.SUCCESS)
+    site.expect(_end(plan.path, 12.4, 4.0) <= 1.0, f"the path ends {_end(plan.path, 12.4, 4.0):.2f} m from the goal")
+
+
+@situation()
+def a_goal_high_above_the_ground_is_out_of_map(site: Site) -> None:
+    """A goal metres above or below the ground ends with OUT_OF_MAP on a map with heights; a flat map has none."""
+    flat = site.map.same_storey == math.inf
+    for z in (-2.0, 3.0):
+        plan = site.navigator.get_path(Pose.planar(5.0, 4.0, z=z))
+        site.expect_outcome(plan, GetPathOutcome.SUCCESS if flat else GetPathOutcome.OUT_OF_MAP)
 
 
 @situation()

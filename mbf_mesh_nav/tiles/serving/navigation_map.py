@@ -126,6 +126,7 @@ class TiledNavigationMap(TileQuestions):
 
     def take_parameters(self, parameters: Any) -> None:
         """Take over ``inscribed_radius`` and ``footprint``."""
+        self.fit_layers(parameters.inscribed_radius)
         self._radius, self.footprint = parameters.inscribed_radius, parameters.footprint
 
     def moment(self) -> Moment:
