@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mbf_abstract.maps.navigation_map import MapContext, MapPlugin
+from mbf_abstract.maps.map_plugin import MapContext, MapPlugin
 from mbf_abstract.plugins import AbstractController, AbstractPlanner, AbstractRecovery, AbstractRefiner
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 

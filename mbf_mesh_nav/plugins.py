@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from mbf_abstract.maps.navigation_map import MapContext, MapPlugin
+from mbf_abstract.maps.map_plugin import MapContext, MapPlugin
 from mbf_abstract.plugins import AbstractController, AbstractPlanner, AbstractRecovery, AbstractRefiner
 from mbf_mesh_nav.map.mesh_map import MeshMap
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import Event
-from mbf_abstract.execution.path_tracker import polyline_lengths
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.server.map_server import MapServer

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mbf_abstract.execution.path_tracker import SAME_PLACE, polyline_lengths
+from mbf_abstract.execution.path_tracker import SAME_PLACE
 from mbf_abstract.geometry import FloatArray, Path, Pose
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
+from mbf_abstract.geometry.polyline import polyline_lengths
 
 _SHORTEST = 1e-18  # m^2, for the squared length of a segment without one
 

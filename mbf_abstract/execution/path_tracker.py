@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
+from mbf_abstract.geometry.polyline import polyline_lengths, reverse_segments
 from mbf_abstract.geometry.transform import Transform
 
 FloatArray = NDArray[np.float64]
@@ -222,35 +223,8 @@ class PathTracker:
         return turning[np.array([turn[np.argmin(gained[turn])] for turn in turns if len(turn)], dtype=np.intp)]
 
 
-def polyline_lengths(points: FloatArray) -> FloatArray:
-    """(n,) length [m] along a polyline (n, k) from its first point to each point."""
-    steps = np.diff(points, axis=0)
-    return np.concatenate([[0.0], np.cumsum(norm(steps))])[: len(points)]
-
-
 def _norm(components: Iterable[float]) -> float:
     total = 0.0
     for component in components:
         total += component * component
     return math.sqrt(total)
-
-
-def reverse_segments(path: Path, points: FloatArray) -> NDArray[np.bool_]:
-    """(n - 1,) bool: which segments lead against the heading of their poses.
-
-    The first and the last pose carry the orientations that were asked for, not the direction of travel: the segments
-    there are backward only if their other neighbour is too, or both their poses say so. A path of two poses is driven
-    forward.
-    """
-    count = len(points)
-    if count < 3:
-        return np.zeros(max(count - 1, 0), dtype=bool)
-    assert path.orientations is not None
-    x, y, z, w = path.orientations.T
-    headings = np.column_stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)])
-    headings, steps = headings[:, : points.shape[1]], np.diff(points, axis=0)
-    at_start, at_end = scalar_products(steps, headings[:-1]) < -1e-9, scalar_products(steps, headings[1:]) < -1e-9
-    reverse = at_start & at_end
-    reverse[0] = at_end[0] and (at_start[0] or reverse[1])
-    reverse[-1] = at_start[-1] and (at_end[-1] or reverse[-2])
-    return reverse

@@ -1,7 +1,7 @@
 """The contract of a navigation map with the core, so that behaviours are written once for all maps.
 
 ``rotate``, ``back_up``, ``drive_on_heading``, ``move_away``, ``clear`` and ``relax`` know their map by this contract
-only. A map of a backend derives ``NavigationMap``; a server hands it to its plugins in a ``MapContext``. A map without
+only. A map of a backend derives ``NavigationMap``; a server hands it to its plugins, see ``map_plugin``. A map without
 sensors or layers answers for motions and places and inherits the rest.
 """
 
@@ -10,18 +10,15 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
-from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.contact import SAME_STOREY, RobotBox
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.maps.view import FloorMap, FloorWindow
-from mbf_abstract.plugins import Plugin, PluginContext
 
 PlaceCheck = Callable[[Pose], PlaceAnswer]
 """State and cost at a pose in the frame of the map."""
@@ -212,44 +209,3 @@ class NavigationMap(ABC):
     def set_layer_parameters(self, name: str, parameters: Any, until: float = math.inf) -> None:
         """Replace the parameters of one layer, up to a time ``until`` [s] if it is given; see ``LayeredMap``."""
         raise KeyError(f"the map has no layer {name!r} whose parameters could be changed")
-
-
-M = TypeVar("M", bound=NavigationMap)
-
-
-@dataclass(frozen=True)
-class MapContext(PluginContext, Generic[M]):
-    """What a plugin of a server with a map is constructed with.
-
-    Attributes
-    ----------
-    navigation_map : NavigationMap
-        The map the plugin is bound to.
-    maps : mapping of name to NavigationMap
-        All maps of a server that has several, e.g. ``local`` and ``global``.
-    transforms : TransformBuffer
-        The frames of the maps; a map may be in another one than goals, paths and robot poses.
-    scans : mapping of str to RangeScan
-        The newest scan of each sensor, in the frame it came in; it changes with every scan. Empty on servers without
-        sensors.
-    """
-
-    navigation_map: M
-    maps: Mapping[str, M] = field(default_factory=dict, kw_only=True)
-    transforms: TransformBuffer = field(default_factory=TransformBuffer, kw_only=True)
-    scans: Mapping[str, RangeScan] = field(default_factory=dict, kw_only=True)
-
-
-class MapPlugin(Plugin):
-    """Keeps the maps of the context; mixed into the plugin interfaces."""
-
-    def __init__(self, context: MapContext[Any]) -> None:
-        super().__init__(context)
-        self.navigation_map: NavigationMap = context.navigation_map
-        self.maps: Mapping[str, NavigationMap] = context.maps
-        self.transforms = context.transforms
-        self.scans = context.scans
-
-    def on_map(self, pose: Pose, navigation_map: NavigationMap | None = None) -> Pose:
-        """Express a pose in the frame of a map, the plugin's own if none is given; raises TransformError."""
-        return self.transforms.transform_pose(pose, (navigation_map or self.navigation_map).frame_id)

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from mbf_abstract.config.configuration import Config, RawConfig, load_config, validate_config
+from mbf_abstract.config.configuration import Config, RawConfig
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.config.installed_plugins import installed_points
+from mbf_abstract.config.reading import load_config, validate_config
 from mbf_abstract.config.registry import PluginError, PluginRegistry
 from mbf_abstract.drive.robot import Robot
 from mbf_abstract.events import EventBus

@@ -115,10 +115,9 @@ class AbstractNavigationServer(MapInterface):
         ValueError
             A value is not legal (pydantic's ValidationError is one), or a parameter is read once, at the start.
         """
-        restored = changes.pop("restore_defaults", False)
-        base = self.config.parameters if restored else self.runtime.parameters
-        self.runtime.parameters = new = with_changes(base, changes, READ_ONCE)
-        self._put_into_effect(new)
+        base = self.config.parameters if changes.pop("restore_defaults", False) else self.runtime.parameters
+        self.runtime.parameters = with_changes(base, changes, READ_ONCE)
+        self._put_into_effect(self.runtime.parameters)
         self.runtime.events.emit(EventKind.PARAMETER_CHANGED, "server", **changes)
 
     def _put_into_effect(self, parameters: NavigationParameters) -> None:

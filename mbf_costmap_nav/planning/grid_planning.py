@@ -16,8 +16,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.execution.path_tracker import polyline_lengths
 from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw
+from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import PlanRequest, PlanResult

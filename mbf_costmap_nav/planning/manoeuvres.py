@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.execution.path_tracker import polyline_lengths
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import arctan2, norm
+from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import CellBox, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.execution.path_tracker import polyline_lengths
 from mbf_abstract.geometry import normalize_angle
 from mbf_abstract.geometry.arithmetic import arctan2
+from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 

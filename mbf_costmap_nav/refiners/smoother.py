@@ -20,9 +20,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.execution.path_tracker import PathTracker, polyline_lengths
+from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.arithmetic import arctan2
+from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter

@@ -19,9 +19,9 @@ from typing import Literal
 
 import numpy as np
 
-from mbf_abstract.execution.path_tracker import reverse_segments
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import exp, norm, tan
+from mbf_abstract.geometry.polyline import reverse_segments
 from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, Encounters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome

@@ -17,7 +17,7 @@ import numpy as np
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.getting_free import getting_free
-from mbf_abstract.maps.navigation_map import MapContext, MapPlugin
+from mbf_abstract.maps.map_plugin import MapContext, MapPlugin
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult

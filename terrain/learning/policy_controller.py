@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from mbf_abstract.drive.velocity_limits import VelocityLimits
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.maps.navigation_map import MapContext, MapPlugin
+from mbf_abstract.maps.map_plugin import MapContext, MapPlugin
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult

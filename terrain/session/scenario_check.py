@@ -26,8 +26,8 @@ from terrain.scenarios.places import Place
 from terrain.scenarios.scenario import Scenario, read_scenario, robot_scenarios
 from terrain.scenarios.settings import apply_world_settings
 from terrain.scenarios.world import ScenarioWorld
+from terrain.session.navigation_config import write_navigation_config
 from terrain.session.robot_fit import notes_on_fit
-from terrain.session.session import write_navigation_config
 from terrain.urdf_robots.robot_choice import RobotChoice, description_of, notes_on
 from terrain.worlds.generate import flat_terrain
 from terrain.worlds.map_files import MapFiles

@@ -11,17 +11,12 @@ Example
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from mbf_abstract.config.findings import ConfigError, Finding
-from mbf_abstract.config.yaml_source import read_yaml
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform import TransformError
@@ -29,24 +24,23 @@ from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.server.map_server import MapServer
-from terrain.description.placeholders import fill_in
 from terrain.physics.actors import Fellow
 from terrain.physics.command_delay import CommandDelay
 from terrain.physics.incidents import ANY_COLLISION, COLLISIONS_WITH, Incident
 from terrain.physics.simulation import Simulation
-from terrain.provenance.named_files import InputCopies, with_whole_folders
+from terrain.provenance.named_files import InputCopies
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.scenarios.environment import with_noise
 from terrain.scenarios.faults import FaultSchedule
 from terrain.scenarios.scenario import Scenario, load_scenario
 from terrain.scenarios.sensors import AnyRobot, make_localization, make_proprioceptive_sensors, make_sensors
-from terrain.scenarios.settings import apply_settings, apply_world_settings
+from terrain.scenarios.settings import apply_world_settings
 from terrain.sensors.rays import FellowRays
 from terrain.sensors.sensor import Sensor
+from terrain.session.navigation_config import write_navigation_config
 from terrain.session.simulation_session import SessionOptions, SimulationSession
 from terrain.session.site import Site
-from terrain.urdf_robots.robot_choice import RobotChoice, description_of
 
 __all__ = ["Session", "SessionOptions"]
 
@@ -221,38 +215,3 @@ class Session(SimulationSession):
             self.recorder.path(self.simulation.time, path.positions)
             server = self.navigator.server
             self.recorder.map(self.simulation.time, server.map_view, server.map_views)
-
-
-def write_navigation_config(
-    source: Path,
-    robot: RobotChoice,
-    maps: Mapping[str, Path],
-    folder: Path,
-    settings: Mapping[str, str],
-    inputs: InputCopies,
-) -> Path:
-    """Write a configuration with the world's map files and the robot's numbers; a run can be planned again from it.
-
-    Parameters
-    ----------
-    source : Path
-        The configuration. Files that it names, by paths from its own folder, are copied into ``inputs``.
-    robot : str or UrdfRobot
-        Whose numbers stand for ``$ROBOT_FOOTPRINT`` and others.
-    maps : mapping of str to Path
-        Placeholder of the configuration -> map file.
-    """
-    text = source.read_text()
-    names = {file: os.path.relpath(file, folder) for file in maps.values()}
-    for placeholder, file in maps.items():
-        text = text.replace(placeholder, names[file])
-    text = fill_in(text, str(source), partial(description_of, robot))
-    target = folder / "navigation.yaml"
-    target.write_text(apply_settings(text, settings))
-    document = read_yaml(target, [])  # what is wrong with it is reported when the server reads it
-    if document is not None:
-        renamed = inputs.renamed(document.data, source.parent, set(names.values()))
-        renamed = with_whole_folders(renamed, source.parent)
-        if renamed != document.data:
-            target.write_text(yaml.safe_dump(renamed, sort_keys=False))
-    return target

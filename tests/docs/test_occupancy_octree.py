@@ -8,7 +8,7 @@ import pytest
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.graph.graph_planner import GraphPlanner
-from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from mbf_abstract.config.configuration import PLUGIN_LISTS, load_config, validate_config
+from mbf_abstract.config.configuration import PLUGIN_LISTS
+from mbf_abstract.config.reading import load_config, validate_config
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.factory import server_class
 from terrain.description.parameters import UrdfRobot

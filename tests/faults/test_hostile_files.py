@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import EpsImagePlugin
 
-from mbf_abstract.config.configuration import load_config
 from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.reading import load_config
 from mbf_abstract.server.factory import read_config
 from mbf_costmap_nav.files.map_description import MapError
 from mbf_costmap_nav.files.map_io import load_image, load_map

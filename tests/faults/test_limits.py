@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from mbf_abstract.config.configuration import load_config
 from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.reading import load_config
 from mbf_abstract.geometry import Path
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.testing.faulty import drive

@@ -4,8 +4,8 @@ import random
 
 import pytest
 
-from mbf_abstract.config.configuration import load_config, validate_config
 from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.reading import load_config, validate_config
 from mbf_abstract.config.registry import PluginRegistry
 
 GOOD = """\

@@ -2,8 +2,8 @@
 
 import pytest
 
-from mbf_abstract.config.configuration import load_config, validate_config
 from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.reading import load_config, validate_config
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose

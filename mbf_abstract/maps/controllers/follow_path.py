@@ -17,7 +17,7 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.maps.navigation_map import MapPlugin
+from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.queries import PADDED, CellState
 from mbf_abstract.maps.room_to_turn import (
     SMALL_TURN,

@@ -16,7 +16,7 @@ from typing import Any
 
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.maps.graph.graph_map import GraphMap
-from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.server.map_server import MapServer
@@ -43,7 +43,7 @@ class GraphMapServer(MapServer):
     def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
         """The radius of a round robot."""
         if not isinstance(footprint, int | float):
-            raise ValueError(f"this map takes the robot for a disc: a radius [m], not {footprint!r}")
+            raise ValueError(f"this map treats the robot as a disc: expected a radius [m], not {footprint!r}")
         return {"robot_radius": footprint}
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:

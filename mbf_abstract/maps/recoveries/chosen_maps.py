@@ -9,7 +9,8 @@ from pydantic import ValidationInfo, field_validator
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.maps.navigation_map import MapContext, MapPlugin, NavigationMap
+from mbf_abstract.maps.map_plugin import MapContext, MapPlugin
+from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractRecovery, RecoveryRequest
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any, Generic, TypeVar
 
-from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import Plugin
 from mbf_mesh_nav.map.mesh_map import MeshMap

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from mbf_abstract.execution.path_tracker import polyline_lengths
 from mbf_abstract.geometry import Path
+from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.maps.navigation_map import MapContext, MapPlugin
+from mbf_abstract.maps.map_plugin import MapContext, MapPlugin
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import AbstractRefiner, RefineResult
 from mbf_abstract.time.cancel import CancelToken

@@ -21,7 +21,7 @@ from mbf_abstract.config.configuration import Config, PluginSpec
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.maps.layers.layer_list import LayerListError
-from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.maps.view import GridView
 from mbf_abstract.parameters import ParameterModel, parameter

@@ -11,7 +11,7 @@ import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult, PlannedMotion
 from mbf_mesh_nav.plugins import MeshController

@@ -17,7 +17,7 @@ from mbf_abstract.server.factory import read_config
 from terrain.experiments.evaluation.protocol import Entry, Protocol
 from terrain.provenance.code import hash_of_code, modules_of_plugins, place_of
 from terrain.provenance.named_files import InputCopies, hash_with_named_files, named_files
-from terrain.session.session import write_navigation_config
+from terrain.session.navigation_config import write_navigation_config
 
 KINDS = ("planner", "controller")
 OWN = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain")

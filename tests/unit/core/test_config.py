@@ -4,8 +4,9 @@ from typing import Literal
 
 import pytest
 
-from mbf_abstract.config.configuration import NavigationParameters, PluginDeclaration, load_config, validate_config
+from mbf_abstract.config.configuration import NavigationParameters, PluginDeclaration
 from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.reading import load_config, validate_config
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.parameters import ParameterModel, PluginParameters, parameter
 from mbf_abstract.plugins import AbstractPlanner, AbstractRecovery, PlanResult, PluginKind, RecoveryResult

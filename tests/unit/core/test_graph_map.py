@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.graph.graph_map import GraphMap, GraphMapParameters, grid_edges
 from mbf_abstract.maps.graph.graph_planner import GraphPlanner
-from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from mbf_abstract.execution.path_tracker import PathTracker, polyline_lengths
+from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_costmap_nav.control.path_geometry import circle_crossing, look_ahead_point, resample
 from mbf_costmap_nav.control.path_handling import to_base_frame
 

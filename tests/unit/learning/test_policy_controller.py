@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest

@@ -9,7 +9,7 @@ from test_tile_server import config, planned, pose, serve
 
 from mbf_abstract.geometry import Path
 from mbf_abstract.goals.goal_types import GetPathGoal, RefinePathGoal
-from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_abstract.testing.contract import check_refiner

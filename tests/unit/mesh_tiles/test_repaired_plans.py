@@ -8,7 +8,7 @@ import pytest
 from sensing_tiles import SensingWhole, drive, sensing_map
 from test_tile_server import pose
 
-from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_abstract.testing.contract.rig import rig

@@ -9,8 +9,8 @@ from tiled_terrains import SPACING, WholeMap, settings, terrain
 
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.goals.goal_types import GetPathGoal
+from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.map_queries import check_path
-from mbf_abstract.maps.navigation_map import MapContext
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
@@ -208,7 +208,7 @@ def test_the_action_interface_plans_on_tiles(tiled_hills, whole_hills, tmp_path)
         assert server.map_views[0] == "safe" and set(server.map_views) == set(server.tiled_map.tiled.index.layers)
         server.set_footprint(0.5)
         assert server.tiled_map.inscribed_radius == 0.5
-        with pytest.raises(ValueError, match="takes the robot for a disc"):
+        with pytest.raises(ValueError, match="treats the robot as a disc"):
             server.set_footprint([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
 
 

@@ -1,0 +1,51 @@
+"""The configuration of a run's server: the scenario's, with the files of its world and the numbers of its robot."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+
+import yaml
+
+from mbf_abstract.config.yaml_source import read_yaml
+from terrain.description.placeholders import fill_in
+from terrain.provenance.named_files import InputCopies, with_whole_folders
+from terrain.scenarios.settings import apply_settings
+from terrain.urdf_robots.robot_choice import RobotChoice, description_of
+
+
+def write_navigation_config(
+    source: Path,
+    robot: RobotChoice,
+    maps: Mapping[str, Path],
+    folder: Path,
+    settings: Mapping[str, str],
+    inputs: InputCopies,
+) -> Path:
+    """Write a configuration with the world's map files and the robot's numbers; a run can be planned again from it.
+
+    Parameters
+    ----------
+    source : Path
+        The configuration. Files that it names, by paths from its own folder, are copied into ``inputs``.
+    robot : str or UrdfRobot
+        Whose numbers stand for ``$ROBOT_FOOTPRINT`` and others.
+    maps : mapping of str to Path
+        Placeholder of the configuration -> map file.
+    """
+    text = source.read_text()
+    names = {file: os.path.relpath(file, folder) for file in maps.values()}
+    for placeholder, file in maps.items():
+        text = text.replace(placeholder, names[file])
+    text = fill_in(text, str(source), partial(description_of, robot))
+    target = folder / "navigation.yaml"
+    target.write_text(apply_settings(text, settings))
+    document = read_yaml(target, [])  # what is wrong with it is reported when the server reads it
+    if document is not None:
+        renamed = inputs.renamed(document.data, source.parent, set(names.values()))
+        renamed = with_whole_folders(renamed, source.parent)
+        if renamed != document.data:
+            target.write_text(yaml.safe_dump(renamed, sort_keys=False))
+    return target
