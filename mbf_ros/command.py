@@ -114,7 +114,7 @@ def _open(
         return _real_robot(Path(what), max_silence)
     worlds = [point for point in entry_points(group=WORLDS_GROUP)]
     if not worlds:
-        raise ValueError(f"{what} is no navigation file, and no package with scenarios is installed")
+        raise ValueError(f"{what} is not a navigation file, and no package with scenarios is installed")
     opener: Callable[..., Any] = worlds[0].load()
     return opener(what, backend, seed, on_step), None
 

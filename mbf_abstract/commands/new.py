@@ -81,7 +81,7 @@ def plugin_source(kind: str, name: str, map_name: str = "") -> str:
     if kind not in KINDS:
         raise ValueError(f"no kind {kind!r}; known: {', '.join(KINDS)}")
     if not name.isidentifier() or name != name.lower() or keyword.iskeyword(name):
-        raise ValueError(f"{name!r} is no name for a module: lower-case letters, digits and underscores")
+        raise ValueError(f"{name!r} is not a valid module name: lower-case letters, digits and underscores")
     template = f"{kind}.py.txt"
     on_any_map = files("mbf_abstract").joinpath(ANY_MAP, template).is_file()
     if kind == EXECUTIVE and map_name:

@@ -83,7 +83,7 @@ def read_arrays(path: Path, max_bytes: int, wanted: Collection[str] | None = Non
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
         if isinstance(error, ArrayFileError):
             raise
-        raise ArrayFileError(f"is no sound .npz file: {error}") from error
+        raise ArrayFileError(f"is not a valid .npz file: {error}") from error
 
 
 def _promised_bytes(archive: zipfile.ZipFile, member: str) -> int:

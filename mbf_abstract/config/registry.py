@@ -163,7 +163,7 @@ class PluginRegistry:
 
     def _checked(self, group: str, type_name: str, plugin_class: object, base: type | None) -> type:
         if not isinstance(plugin_class, type):
-            raise PluginError(group, type_name, f"is no class but a {type(plugin_class).__name__}")
+            raise PluginError(group, type_name, f"is not a class but a {type(plugin_class).__name__}")
         expected = base or _BASES.get(group, object)
         if issubclass(plugin_class, expected):
             if missing := sorted(getattr(plugin_class, "__abstractmethods__", ())):

@@ -36,13 +36,13 @@ def check_driver(robot: Robot, clock: Clock) -> None:
     for method, arguments in METHODS.items():
         problem = _method_problem(getattr(robot, method, None), arguments)
         if problem:
-            raise DriverError(f"{name} is no robot driver: {method} {problem}")
+            raise DriverError(f"{name} is not a robot driver: {method} {problem}")
     radius = getattr(robot, "min_turning_radius", 0.0)
     if not isinstance(radius, Real) or not 0.0 <= float(radius) < math.inf:
-        raise DriverError(f"{name} is no robot driver: min_turning_radius is {radius!r}, expected a length in m")
+        raise DriverError(f"{name} is not a robot driver: min_turning_radius is {radius!r}, expected a length in m")
     problem = _first_odometry_problem(robot, clock)
     if problem:
-        raise DriverError(f"{name} is no robot driver: {problem}")
+        raise DriverError(f"{name} is not a robot driver: {problem}")
 
 
 def _method_problem(method: object, arguments: int) -> str:

@@ -111,7 +111,7 @@ class PluginRun(Generic[P]):
         """Text on a call that was abandoned without a cancel, without its subject."""
         if self._hung:
             limit = self.runtime.parameters.hang_guard
-            return f"took over {limit:g} s of real time while simulated time stood (hang_guard)"
+            return f"took more than {limit:g} s of real time while simulated time stood still (hang_guard)"
         return f"gave no answer within {self.patience:g} s and its grace"
 
     @property

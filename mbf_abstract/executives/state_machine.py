@@ -87,7 +87,7 @@ class StateMachine(Composite):
 def _check(name: str, states: Mapping[str, State]) -> None:
     ends = (Status.SUCCESS, Status.FAILURE)
     problems = [
-        f"state {key!r} leads to {target!r}, which is no state"
+        f"state {key!r} leads to {target!r}, which is not a state"
         for key, state in states.items()
         for target in state.transitions.values()
         if target not in states and target not in ends

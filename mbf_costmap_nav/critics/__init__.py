@@ -1,7 +1,7 @@
 """The terms of a trajectory's cost that MPPI and DWA share.
 
 A critic is a function from ``Rollouts`` to one cost a sample, (samples,) float32 without the weight, or None where it
-does not apply, as the goal's far from the goal. To add one, write the function, list it in ``CRITICS``, and add its
+does not apply, e.g. that of the goal far from it. To add one, write the function, list it in ``CRITICS``, and add its
 weight to ``CriticParameters`` under the same name.
 """
 

@@ -1,4 +1,4 @@
-"""Critics near the goal: the distance to it, and its heading. Before, the path critics apply."""
+"""Critics near the goal: the distance to it, and its heading. Farther away the path critics apply."""
 
 from __future__ import annotations
 

@@ -197,7 +197,7 @@ def _read_pixels(file: Path, max_cells: int, mode: MapMode) -> NDArray[np.uint8]
     except Image.DecompressionBombError as error:
         raise MapError(file, f"has too many pixels: {error}") from error
     except UnidentifiedImageError as error:
-        raise MapError(file, "is no image that can be read (pgm, png, bmp)") from error
+        raise MapError(file, "is not an image that can be read (pgm, png, bmp)") from error
     except (OSError, ValueError, SyntaxError) as error:  # Pillow raises any of these for damaged files
         raise MapError(file, getattr(error, "strerror", None) or f"damaged image: {error}") from error
     channels = 4 if mode is MapMode.TRINARY and has_opacity else 3

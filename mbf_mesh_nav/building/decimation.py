@@ -77,11 +77,11 @@ def decimated_to(vertices: FloatArray, faces: IntArray, share: float) -> Decimat
     Raises
     ------
     MeshError
-        ``fast-simplification`` is not installed, or so few faces are no sound mesh.
+        ``fast-simplification`` is not installed, or so few faces do not form a sound mesh.
     """
     coarse = _of_share(vertices, faces, _locator(vertices, faces), share)
     if coarse is None:
-        raise MeshError("mesh", [f"{share:.1%} of its {len(faces)} faces are no sound mesh"])
+        raise MeshError("mesh", [f"{share:.1%} of its {len(faces)} faces do not form a sound mesh"])
     return coarse
 
 

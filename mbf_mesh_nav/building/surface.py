@@ -42,7 +42,7 @@ class SurfaceParameters(ParameterModel):
         4, "Points with fewer points around them are errors; 1 = keep all. Around is up to twice the cell.", ge=1
     )
     clearance: float = parameter(
-        1.5, "Free height that the robot needs; points above that are no obstacle.", unit="m", gt=0.1, le=20.0
+        1.5, "Free height that the robot needs; points above that are not obstacles.", unit="m", gt=0.1, le=20.0
     )
     step_height: float = parameter(
         0.2, "What stands up to this height is driven over, such as grass.", unit="m", ge=0.02, le=2.0

@@ -48,7 +48,7 @@ def check_gltf(path: Path) -> None:
         if not triangles and not reasons:
             reasons = ["there is no face in it"]
     except (TypeError, AttributeError, ValueError) as error:
-        raise MeshError(str(path), [f"is no glTF: {error}"]) from error
+        raise MeshError(str(path), [f"is not a glTF file: {error}"]) from error
     if reasons:
         more = [f"and {len(reasons) - MAX_REASONS} more"] if len(reasons) > MAX_REASONS else []
         raise MeshError(str(path), reasons[:MAX_REASONS] + more)
@@ -60,9 +60,10 @@ def _document(path: Path) -> dict[str, Any]:
     try:
         document = json.loads(content)
     except (ValueError, RecursionError) as error:
-        raise MeshError(str(path), [f"is no glTF: {error}"]) from error
+        raise MeshError(str(path), [f"is not a glTF file: {error}"]) from error
     if not isinstance(document, dict):
-        raise MeshError(str(path), [f"is no glTF: expected an object at the top, got {type(document).__name__}"])
+        got = type(document).__name__
+        raise MeshError(str(path), [f"is not a glTF file: expected an object at the top, got {got}"])
     return document
 
 
@@ -70,7 +71,7 @@ def _first_chunk(path: Path) -> bytes:
     with path.open("rb") as file:
         head = file.read(GLB_HEADER_BYTES + CHUNK_HEADER_BYTES)
         if head[:4] != GLB_MAGIC or head[16:20] != JSON_CHUNK:
-            raise MeshError(str(path), ["is no glTF: it does not begin with a header and a chunk of JSON"])
+            raise MeshError(str(path), ["is not a glTF file: it does not begin with a header and a chunk of JSON"])
         size = int.from_bytes(head[12:16], "little")
         content = file.read(min(size, path.stat().st_size))
     if len(content) < size:
@@ -114,7 +115,7 @@ def _wrong_nodes(tables: dict[str, Table]) -> list[str]:
     try:
         TopologicalSorter({child: (above,) for child, above in parent.items()}).prepare()
     except CycleError as error:
-        reasons.append("the nodes are no tree: " + " -> ".join(f"nodes[{one}]" for one in error.args[1]))
+        reasons.append("the nodes do not form a tree: " + " -> ".join(f"nodes[{one}]" for one in error.args[1]))
     return reasons
 
 

@@ -110,7 +110,7 @@ def _loaded(path: Path, part: str) -> Any:
         def get(self, name: str) -> bytes:
             file = (path.parent / name.strip()).resolve()
             if path.suffix.lower() != ".gltf" or not file.is_relative_to(path.parent.resolve()) or special_file(file):
-                raise ValueError(f"'{name}' is no file of numbers beside the mesh")
+                raise ValueError(f"'{name}' is not a file of numbers beside the mesh")
             return file.read_bytes()
 
     ending = path.suffix.lower()

@@ -7,7 +7,7 @@ inf. Deviations: points within ``ground_tolerance`` of the mesh are explained by
 ``robot_height``, which has a finite default, so nothing spills to the storey below; hits may be kept for
 ``decay_time`` and are cleared when later rays pass through them, also rays that hit nothing. A layer may listen to
 several sensors: what one has seen is forgotten by its own next cloud, and by another's rays only where they pass
-through. A sensor that is silent for longer than ``expected_update_rate`` makes the map not current, so that no
+through. A sensor that is silent for longer than ``expected_update_rate`` makes the map stale, so that no
 controller drives on it, and so does clearing until the next cloud: what was forgotten may still be there.
 Cost: two tree queries a point, about 2 microseconds.
 """
@@ -47,7 +47,7 @@ class ObstacleParameters(LayerParameters):
     sources: tuple[str, ...] = parameter(
         (), "Names of the sensors it listens to, each of which must send scans; empty = all that send any."
     )
-    robot_height: float = parameter(1.0, "Points higher above the surface are no obstacle.", unit="m", gt=0.0)
+    robot_height: float = parameter(1.0, "Points higher above the surface are not obstacles.", unit="m", gt=0.0)
     min_obstacle_dist: float = parameter(
         0.0, "Points no farther from the sensor are ignored, such as those of the robot itself.", unit="m", ge=0.0
     )

@@ -230,7 +230,7 @@ def plan_mesh_layers(
         return [*_wrong_inputs(planned), *_narrower_than_robot(planned, parameters.inscribed_radius)]
 
     unknown_default = bool(parameters.default_layer) and parameters.default_layer not in names
-    findings = [f"default_layer {parameters.default_layer!r} is no layer"] if unknown_default else []
+    findings = [f"default_layer {parameters.default_layer!r} is not a layer"] if unknown_default else []
     try:
         plan = plan_layers(parameters.layers, layer_blocks, load_layer or layer_loader("mesh", MeshLayer), check)
     except LayerListError as error:

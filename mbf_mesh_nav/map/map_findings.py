@@ -60,9 +60,8 @@ def _narrow(mesh_map: MeshMap) -> Iterator[Finding]:
         return
     inflations = {name: one.parameters for name, one in layers.items() if hasattr(one.parameters, "inflation_radius")}
     if radius > 0.0 and not inflations:
-        text = (
-            f"no layer is an inflation or a tilt: the robot is planned as a point, its inscribed radius is {radius:g} m"
-        )
+        text = "no layer is an inflation or a tilt: the planners treat the robot as a point, its inscribed radius is "
+        text += f"{radius:g} m"
         yield Finding("narrow", text, NOWHERE, harmless=True)
     for name, parameters in inflations.items():
         own = float(getattr(parameters, "inscribed_radius", radius))

@@ -131,7 +131,7 @@ def read_tile_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[An
     except ArrayFileError as error:
         raise MeshError(str(path), [str(error)]) from error
     if missing := [name for name in names if name not in arrays]:
-        raise MeshError(str(path), [f"has no array '{missing[0]}'; it is no tile"])
+        raise MeshError(str(path), [f"has no array '{missing[0]}'; it is not a tile"])
     if wrong := misfit(arrays):
         raise MeshError(str(path), [wrong])
     return arrays

@@ -134,7 +134,7 @@ def open_bag(path: Path) -> Iterator[Bag]:
         raise
     except Exception as error:  # whatever rosbags makes of damaged bytes
         advice = "; rosbag reindex may save the rest" if is_ros1 else "; ros2 bag reindex may save the rest"
-        raise BagError(f"{path}: is no bag, or is cut short: {_reason(error)}{advice}") from error
+        raise BagError(f"{path}: is not a bag, or is truncated: {_reason(error)}{advice}") from error
     try:
         yield bag
     finally:
@@ -159,7 +159,7 @@ def _types_of(connection: Any) -> Any:
     if connection.msgdef.format == MessageDefinitionFormat.NONE:
         store = get_typestore(Stores.LATEST)
         if connection.msgtype not in store.fielddefs:
-            raise BagError("the bag holds no definition, and it is no type of ROS 2 itself")
+            raise BagError("the bag holds no definition, and it is not a type of ROS 2 itself")
         return store
     store = get_typestore(Stores.EMPTY)
     if connection.msgdef.format == MessageDefinitionFormat.MSG:

@@ -119,7 +119,7 @@ def pose_of(message: Mapping[str, Any], context: MessageContext, where: str = "p
     header, body = message["header"], message["pose"]
     rotation = quaternion_of(body["orientation"])
     if not any(rotation):
-        raise InvalidValueError(f"{where}: the quaternion (0, 0, 0, 0) is no rotation; without a turn w is 1")
+        raise InvalidValueError(f"{where}: the quaternion (0, 0, 0, 0) is not a rotation; without a turn w is 1")
     try:
         frame, stamp = context.frame(header["frame_id"]), context.stamp(header["stamp"])
         return Pose(vector_of(body["position"]), rotation, frame, stamp)

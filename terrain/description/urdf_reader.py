@@ -142,7 +142,7 @@ class _Reader:
             self.refuse(root, "", "at least one <link>", "none")
         elif len(bases) != 1:
             got = ", ".join(map(repr, bases)) or "a circle of joints"
-            self.refuse(root, "", "one link that is no child of a joint", got)
+            self.refuse(root, "", "one link that is not the child of a joint", got)
         elif not self.findings:
             hanging = subtree(Urdf(self.file, "", links, joints, bases[0]), bases[0])
             for name in links.keys() - set(hanging):

@@ -189,7 +189,7 @@ class Recording:
         except FileNotFoundError as error:
             raise RecordingError(f"{file}: expected the recording of a run, got no such file") from error
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-            raise RecordingError(f"{file}: is no readable recording: {type(error).__name__}: {error}") from error
+            raise RecordingError(f"{file}: is not a readable recording: {type(error).__name__}: {error}") from error
 
 
 def _pose_row(pose: Pose) -> list[float]:

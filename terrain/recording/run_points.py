@@ -26,7 +26,7 @@ def read_run_points(folder: Path, max_points: int) -> FloatArray:
     try:
         arrays = read_arrays(file, BYTES_A_POINT * max_points, (SCANS,))
     except (OSError, ArrayFileError) as error:
-        raise RecordingError(f"{file}: is no readable recording: {error}") from error
+        raise RecordingError(f"{file}: is not a readable recording: {error}") from error
     if SCANS not in arrays or arrays[SCANS].ndim != 2 or arrays[SCANS].shape[1] != 3:
         raise RecordingError(f"{file}: is no recording of a run")
     if not len(arrays[SCANS]):

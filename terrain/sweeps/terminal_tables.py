@@ -1,4 +1,4 @@
-"""The tables of a sweep in a terminal; they fit 80 columns, because variants stand in them by a letter."""
+"""The tables of a sweep in a terminal; variants are named by a letter, so that they fit 80 columns."""
 
 from __future__ import annotations
 

@@ -299,5 +299,5 @@ def test_a_bad_costmap_layer_is_caught(layer_class, text):
 
 @pytest.mark.parametrize("no_layer", [dict, PluginRegistry, 5])
 def test_what_is_no_layer_is_refused(no_layer):
-    with pytest.raises(TypeError, match="is no layer: expected a class with contract_check"):
+    with pytest.raises(TypeError, match="is not a layer: expected a class with contract_check"):
         check_layer(no_layer)

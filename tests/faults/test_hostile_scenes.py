@@ -98,7 +98,7 @@ def test_a_gltf_reads_numbers_from_its_own_folder_only(tmp_path, name):
         return tmp_path / "maps" / "hill.gltf"
 
     assert len(read_mesh(named("own.bin"))[1]) == len(FACES)
-    with pytest.raises(MeshError, match=r"is no file of numbers beside the mesh|No such file"):
+    with pytest.raises(MeshError, match=r"is not a file of numbers beside the mesh|No such file"):
         read_mesh(named(name.format(folder=tmp_path)))
 
 

@@ -94,7 +94,7 @@ def test_a_planner_that_keeps_the_processor_busy_is_found_by_the_wall_clock_guar
         session.planner.play(hang)
         handle = session.navigator.send(GOAL)
         result = handle.wait()
-        text = "took over 0.2 s of real time while simulated time stood (hang_guard)"
+        text = "took more than 0.2 s of real time while simulated time stood still (hang_guard)"
         assert result.message == f"planner 'planner' {text}"
         assert session.navigator.send(GOAL).result.message == f"planner 'planner' is quarantined: it {text}"
         hang.release.cancel()

@@ -266,7 +266,7 @@ def test_check_names_the_file_whose_layers_make_no_map(hill, tmp_path):
     result = mbf("check", file)
 
     assert result.exit_code == 2
-    assert f"{file}: mesh_map: layers read each other in a circle: a -> b -> a" in result.output.replace("\n", "")
+    assert f"{file}: mesh_map: layers read each other in a cycle: a -> b -> a" in result.output.replace("\n", "")
 
 
 def test_plugins_lists_planners_of_both_maps():

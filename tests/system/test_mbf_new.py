@@ -139,8 +139,8 @@ def test_the_layers_go_to_the_group_of_their_map(tmp_path):
         (("layer", "x"), "a layer needs a map: --map costmap or --map mesh"),
         (("executive", "x", "--map", "mesh"), "an executive runs on every map: leave out --map mesh"),
         (("planner", "x", "--map", "octomap"), "no map 'octomap' is installed; known: costmap, mesh"),
-        (("planner", "2fast", "--map", "mesh"), "'2fast' is no name for a module"),
-        (("planner", "class", "--map", "mesh"), "'class' is no name for a module"),
+        (("planner", "2fast", "--map", "mesh"), "'2fast' is not a valid module name"),
+        (("planner", "class", "--map", "mesh"), "'class' is not a valid module name"),
     ],
 )
 def test_a_bad_argument_is_named_and_nothing_is_written(arguments, text, tmp_path):

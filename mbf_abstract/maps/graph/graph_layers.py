@@ -25,7 +25,7 @@ class ObstacleParameters(LayerParameters):
     expected_update_rate: float = parameter(
         1.0, "Longest allowed time between two scans of a sensor; 0 switches the check off.", unit="s", ge=0.0
     )
-    robot_height: float = parameter(1.0, "Hits higher above the ground are no obstacle.", unit="m", gt=0.0)
+    robot_height: float = parameter(1.0, "Hits higher above the ground are not obstacles.", unit="m", gt=0.0)
     ground_tolerance: float = parameter(0.05, "Hits lower above the ground are part of it.", unit="m", ge=0.0)
 
 

@@ -145,7 +145,7 @@ def dependency_order(inputs: Mapping[str, Sequence[str]]) -> list[str]:
     try:
         sorter.prepare()
     except CycleError as error:
-        findings.append(f"layers read each other in a circle: {' -> '.join(_from_first(error.args[1], list(inputs)))}")
+        findings.append(f"layers read each other in a cycle: {' -> '.join(_from_first(error.args[1], list(inputs)))}")
     if findings:
         raise LayerListError("; ".join(findings))
     configured = list(inputs).index

@@ -41,7 +41,7 @@ class TrackingParameters(ParameterModel):
 
     cluster_distance: float = parameter(0.3, "Points this near belong to one object.", unit="m", gt=0.0, le=5.0)
     min_points: int = parameter(3, "Smaller clusters begin no object.", ge=1, le=1000)
-    max_size: float = parameter(1.5, "Longer clusters are no objects, but walls.", unit="m", gt=0.0, le=20.0)
+    max_size: float = parameter(1.5, "Longer clusters are walls, not objects.", unit="m", gt=0.0, le=20.0)
     max_objects: int = parameter(50, "Most objects that are followed.", ge=1, le=1000, dynamic=False)
     association_distance: float = parameter(
         0.6, "Farther than this from where it was expected it is another object.", unit="m", gt=0.0, le=10.0

@@ -33,6 +33,6 @@ def check_layer(layer_class: type, *world: Any, **options: Any) -> None:
     named = getattr(layer_class, "contract_check", None)
     if not isinstance(named, str):
         name = getattr(layer_class, "__qualname__", repr(layer_class))
-        raise TypeError(f"{name} is no layer: expected a class with contract_check = 'module:function'")
+        raise TypeError(f"{name} is not a layer: expected a class with contract_check = 'module:function'")
     module, _, function = named.partition(":")
     getattr(importlib.import_module(module), function)(layer_class, *world, **options)

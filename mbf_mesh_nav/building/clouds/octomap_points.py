@@ -68,7 +68,7 @@ def _read_header(path: Path, file: BinaryIO) -> _Header:
     first = file.readline(256).decode("ascii", "replace").strip()
     if first != FIRST_LINES[path.suffix.lower()]:
         expected = FIRST_LINES[path.suffix.lower()]
-        raise MeshError(str(path), [f"is no OctoMap {path.suffix}: expected '{expected}', got {first!r:.60}"])
+        raise MeshError(str(path), [f"is not an OctoMap {path.suffix} file: expected '{expected}', got {first!r:.60}"])
     values: dict[str, str] = {}
     for _ in range(MAX_HEADER_LINES):
         line = file.readline(4096)

@@ -40,7 +40,7 @@ def read_pcd_points(path: Path, max_points: int) -> StoredPoints:
             width, height = int(header["WIDTH"][0]), int(header["HEIGHT"][0])
             count, form = int(header.get("POINTS", [str(width * height)])[0]), header["DATA"][0]
         except (LookupError, ValueError) as error:
-            raise MeshError(str(path), [f"its header is no PCD header: {error}"]) from error
+            raise MeshError(str(path), [f"its header is not a PCD header: {error}"]) from error
         if count != width * height:
             raise MeshError(str(path), [f"POINTS {count} is not WIDTH {width} x HEIGHT {height}"])
         refuse_count(path, count, max_points)

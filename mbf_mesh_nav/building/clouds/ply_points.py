@@ -68,7 +68,7 @@ def has_faces(path: Path) -> bool:
 
 def _read_header(path: Path, file: BinaryIO) -> tuple[str, list[_Element]]:
     if file.readline(8).strip() != b"ply":
-        raise MeshError(str(path), ["is no PLY: it does not begin with 'ply'"])
+        raise MeshError(str(path), ["is not a PLY file: it does not begin with 'ply'"])
     form, elements = "", list[_Element]()
     try:
         for _ in range(MAX_HEADER_LINES):
@@ -86,7 +86,7 @@ def _read_header(path: Path, file: BinaryIO) -> tuple[str, list[_Element]]:
         else:
             raise MeshError(str(path), ["the file is cut off within its header: there is no end_header"])
     except (LookupError, ValueError) as error:
-        raise MeshError(str(path), [f"its header has a line that is no PLY: {' '.join(words)!r:.80}"]) from error
+        raise MeshError(str(path), [f"its header has a line that is not PLY: {' '.join(words)!r:.80}"]) from error
     if form != "ascii" and form not in BYTE_ORDERS:
         raise MeshError(str(path), [f"unknown format {form!r:.40}, known are: ascii, {', '.join(BYTE_ORDERS)}"])
     return form, elements

@@ -86,7 +86,7 @@ def coordinates(path: Path, records: NDArray[np.void]) -> StoredPoints:
         raise MeshError(str(path), [text])
     kinds = [records.dtype[name] for name in "xyz"]
     if any(kind.shape for kind in kinds):
-        raise MeshError(str(path), ["x, y and z are no single numbers"])
+        raise MeshError(str(path), ["x, y and z are not single numbers"])
     points = np.empty((len(records), 3), dtype=np.float64)
     for axis, name in enumerate("xyz"):
         points[:, axis] = records[name]

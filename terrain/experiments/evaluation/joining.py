@@ -49,7 +49,7 @@ def join(own: Results, others: Mapping[str, Results], protocol: Protocol) -> Joi
         if names:
             joined.origins.append(_origin(other.head, list(names.values())))
         if left_out:
-            joined.origins.append(f"Left out of {file}, for the same entry is in the table: {', '.join(left_out)}.")
+            joined.origins.append(f"Left out of {file}, because the same entry is in the table: {', '.join(left_out)}.")
     return joined
 
 

@@ -73,7 +73,7 @@ def test_a_second_slot_plans_beside_the_drive_and_a_newer_goal_takes_the_robot_o
 
 def test_a_pose_that_means_nothing_and_an_action_that_is_not_there_fail_with_a_text(page, session):
     nonsense, unknown = page("refused").value()
-    assert str(int(GetPathOutcome.INVALID_GOAL)) in nonsense["failure"] and "is no rotation" in nonsense["failure"]
+    assert str(int(GetPathOutcome.INVALID_GOAL)) in nonsense["failure"] and "is not a rotation" in nonsense["failure"]
     assert "there is no action '/dance'" in unknown["failure"]
     assert not session.planner.requests
 
@@ -87,7 +87,7 @@ def test_a_goal_of_ros_1_arrives_with_feedback(page, session):
 def test_a_goal_of_ros_1_is_canceled_or_rejected_with_a_text(page, session, creeping):
     status, text, refused, why = page("actionlib_cancel").value()
     assert (status, refused) == (PREEMPTED, REJECTED)
-    assert text.startswith("CANCELED") and "is no rotation" in why
+    assert text.startswith("CANCELED") and "is not a rotation" in why
     assert session.robot.command.is_stopped()
 
 

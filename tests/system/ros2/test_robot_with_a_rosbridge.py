@@ -95,7 +95,7 @@ def test_a_newer_goal_takes_the_robot_over_beside_a_goal_of_another_slot(robot):
 def test_a_pose_that_means_nothing_ends_aborted_with_a_text(robot):
     end = robot.client.wait(robot.client.send("move_base", target=[1.0, 0.0, "map", 0.0]), "result")
     assert (end["status"], end["outcome"]) == ("aborted", GetPathOutcome.INVALID_GOAL)
-    assert "is no rotation" in end["message"]
+    assert "is not a rotation" in end["message"]
 
 
 def test_after_the_rosbridge_is_killed_the_robot_stands_until_the_next_goal_which_works(robot):

@@ -69,4 +69,4 @@ def test_a_goal_is_canceled(serving, client, sent):
 def test_a_pose_that_means_nothing_is_rejected(serving, client, sent):
     _, server = serving()
     _, _, ended = sent(client(server.port), goal_message(1.0, w=0.0))
-    assert "is no rotation" in ended.wait_for(lambda status: status["status"] == REJECTED)["text"]
+    assert "is not a rotation" in ended.wait_for(lambda status: status["status"] == REJECTED)["text"]

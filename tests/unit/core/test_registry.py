@@ -123,7 +123,7 @@ def test_two_distributions_with_one_name_are_a_clash(installed, plugin_module):
         ("plugin_module_under_test:Missing", "import failed: AttributeError"),
         ("plugin_module_under_test:Unfinished", "does not implement make_plan"),
         ("plugin_module_under_test:NavCorePlanner", "class NavCorePlanner is no AbstractPlanner"),
-        ("plugin_module_under_test:function", "is no class but a builtin_function_or_method"),
+        ("plugin_module_under_test:function", "is not a class but a builtin_function_or_method"),
     ],
 )
 def test_what_cannot_be_used_is_refused_alike_as_module_type_and_as_entry_point(
@@ -188,7 +188,7 @@ def test_the_listing_holds_every_plugin_with_origin_and_error(installed, plugin_
     assert rows == [
         ("mesh.broken", "planners", "plugins-of-others 1.0", "import failed: RuntimeError: no driver"),
         ("mesh.fast", "planners", "plugins-of-others 1.0", None),
-        ("mesh.odd", "planners", "plugins-of-others 1.0", "is no class but a builtin_function_or_method"),
+        ("mesh.odd", "planners", "plugins-of-others 1.0", "is not a class but a builtin_function_or_method"),
         ("own", "servers", "registered", None),
     ]
 

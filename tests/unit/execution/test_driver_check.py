@@ -74,8 +74,8 @@ class NumberForMethod(Good):
 @pytest.mark.parametrize(
     ("robot", "text"),
     [
-        (object(), "object is no robot driver: send_command is missing"),
-        (None, "NoneType is no robot driver: send_command is missing"),
+        (object(), "object is not a robot driver: send_command is missing"),
+        (None, "NoneType is not a robot driver: send_command is missing"),
         (LoopbackRobot, "must be a driver object, got the class LoopbackRobot"),
         (NoOdometry(), "odometry is missing"),
         (NumberForMethod(), "odometry is int, expected a method"),

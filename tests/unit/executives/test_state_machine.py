@@ -69,7 +69,7 @@ def test_all_mistakes_are_reported_at_once(scripted):
     with pytest.raises(ValueError) as error:
         StateMachine("m", {"a": State(scripted("S"), {S: "nowhere"}), "b": State(scripted("S"), {F: F})})
     text = str(error.value)
-    assert "'nowhere', which is no state" in text
+    assert "'nowhere', which is not a state" in text
     assert "state 'a' has no transition for FAILURE" in text
     assert "state 'b' has no transition for SUCCESS" in text
 

@@ -134,8 +134,16 @@ def test_a_map_is_built_from_an_octree_as_from_the_points_in_it(tmp_path, name):
 @pytest.mark.parametrize(
     ("name", "options", "text"),
     [
-        ("a.bt", {"line": "# Octomap OcTree file"}, "is no OctoMap .bt: expected '# Octomap OcTree binary file', got"),
-        ("a.ot", {"line": "# Octomap OcTree binary file"}, "is no OctoMap .ot: expected '# Octomap OcTree file', got"),
+        (
+            "a.bt",
+            {"line": "# Octomap OcTree file"},
+            "not an OctoMap .bt file: expected '# Octomap OcTree binary file', got",
+        ),
+        (
+            "a.ot",
+            {"line": "# Octomap OcTree binary file"},
+            "not an OctoMap .ot file: expected '# Octomap OcTree file', got",
+        ),
         ("a.bt", {"kind": "CountingOcTree"}, "id: expected OcTree or ColorOcTree, got 'CountingOcTree'"),
         ("a.bt", {"size": "many"}, "its header has no usable id, size and res: invalid literal"),
         ("a.ot", {"size": 0}, "size: its tree has 0 nodes"),

@@ -202,8 +202,8 @@ def nodes_of_text(document):
     [
         (without_views, r"meshes\[0\].primitives\[0\].*names bufferViews\[\d\], there are 0"),
         (without_numbers, r"accessors\[\d\] has no bufferView, so nothing is in it"),
-        (a_cycle, r"the nodes are no tree: nodes\[1\] -> nodes\[2\] -> nodes\[0\] -> nodes\[1\]$"),
-        (its_own_child, r"the nodes are no tree: nodes\[0\] -> nodes\[0\]$"),
+        (a_cycle, r"the nodes do not form a tree: nodes\[1\] -> nodes\[2\] -> nodes\[0\] -> nodes\[1\]$"),
+        (its_own_child, r"the nodes do not form a tree: nodes\[0\] -> nodes\[0\]$"),
         (two_parents, r"nodes\[1\]: has the child 2, which is a child of nodes\[0\], too"),
         (an_unknown_child, r"nodes\[0\]: names nodes\[77\], there are"),
         (a_huge_count, r"needs 12000000000000 bytes of a view of"),
@@ -211,7 +211,7 @@ def nodes_of_text(document):
         (an_unknown_accessor, r"primitives\[0\].indices: names accessors\[9\], there are"),
         (compressed, "compressed by KHR_draco_mesh_compression, which is not read"),
         (no_mesh, r"nodes\[\d\]: names meshes\[0\], there are 0"),
-        (nodes_of_text, "is no glTF: nodes: expected a list of objects"),
+        (nodes_of_text, "is not a glTF file: nodes: expected a list of objects"),
     ],
 )
 def test_a_gltf_whose_references_lead_nowhere_is_one_clear_error(tmp_path, change, text):
@@ -226,7 +226,7 @@ def test_a_gltf_whose_references_lead_nowhere_is_one_clear_error(tmp_path, chang
 @pytest.mark.parametrize("ending", ["gltf", "glb"])
 def test_what_is_no_gltf_is_refused_as_such(tmp_path, ending, content):
     (tmp_path / f"hill.{ending}").write_bytes(content)
-    with pytest.raises(MeshError, match="is no glTF"):
+    with pytest.raises(MeshError, match="is not a glTF file"):
         read_mesh(tmp_path / f"hill.{ending}")
 
 

@@ -187,7 +187,7 @@ TILT = {"name": "tilt", "type": "tilt"}
         (
             [BORDER],
             None,
-            "no layer is an inflation or a tilt: the robot is planned as a point",
+            "no layer is an inflation or a tilt: the planners treat the robot as a point",
         ),
         ([BORDER, INFLATION], 0.34, ""),
         ([BORDER, TILT, INFLATION], 0.2, ""),

@@ -57,7 +57,7 @@ def test_every_mistake_in_the_layers_is_reported_at_once():
     for part in (
         "'c' is used twice",
         "parameters for 'e', but no such layer",
-        "default_layer 'final' is no layer",
+        "default_layer 'final' is not a layer",
         "nonsense: unknown type; known types: border, ",
         "'b' of type steepness takes 0 inputs, got 1",
         "layer 'd': radius",
@@ -151,7 +151,7 @@ def test_layer_class_can_be_named_by_module():
 def test_a_layer_class_that_cannot_be_loaded_is_named_beside_the_other_findings(path):
     parameters = MeshMapParameters(layers=[{"name": "mine", "type": path}], default_layer="other")
 
-    with pytest.raises(LayerListError, match="default_layer 'other' is no layer") as error:
+    with pytest.raises(LayerListError, match="default_layer 'other' is not a layer") as error:
         build_mesh_map(parameters, vertices=VERTICES, faces=FACES)
     assert f"layer 'mine': mesh_layers: {path}: import failed: " in str(error.value)
 

@@ -48,7 +48,7 @@ def replace_by(name, of_old):
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        (lambda arrays: arrays.pop("faces"), "has no array 'faces'; it is no tile"),
+        (lambda arrays: arrays.pop("faces"), "has no array 'faces'; it is not a tile"),
         (replace_by("costs", lambda old: old.astype(np.float64)), "'costs' holds float64, expected float32"),
         (replace_by("normals", lambda old: old[:, :2]), r"'normals' has the shape \(\d+, 2\), expected \(\d+, 3\)"),
         (replace_by("lethal", lambda old: old[:, 1:]), r"'lethal' has the shape .* expected \(8, \d+\)"),
@@ -118,7 +118,7 @@ def test_a_layer_is_changed_on_tiles_of_the_map_only_and_to_sound_values(folder)
 def test_a_tile_that_was_truncated_is_refused(folder):
     file = tile_file(folder, KEY)
     file.write_bytes(file.read_bytes()[:-2000])
-    with pytest.raises(MeshError, match=r"tile_1_1.npz: is no sound .npz file"):
+    with pytest.raises(MeshError, match=r"tile_1_1.npz: is not a valid .npz file"):
         read_tile(file)
 
 
@@ -127,7 +127,7 @@ def test_a_tile_with_a_flipped_bit_is_refused(folder):
     content = bytearray(file.read_bytes())
     content[1000] ^= 1
     file.write_bytes(bytes(content))
-    with pytest.raises(MeshError, match=r"tile_1_1.npz: is no sound .npz file: Bad CRC-32"):
+    with pytest.raises(MeshError, match=r"tile_1_1.npz: is not a valid .npz file: Bad CRC-32"):
         read_tile(file)
 
 

@@ -35,7 +35,7 @@ def test_a_layer_takes_the_place_of_the_stored_one_of_its_name_and_adds_to_it(ti
             "layers: [{name: o, type: obstacle}]\n  default_layer: safe",
             "default_layer 'safe': expected one of the list",
         ),
-        ("layers: [{name: o, type: obstacle}]\n  default_layer: x", "default_layer 'x' is no layer"),
+        ("layers: [{name: o, type: obstacle}]\n  default_layer: x", "default_layer 'x' is not a layer"),
         ("layers: [{name: shown, type: obstacle}]", "layer name 'shown' is used twice"),
         ("layers: [{name: o, type: obstacle}, {name: i, type: inflation, inputs: [p]}]", "i reads unknown layer 'p'"),
         (

@@ -13,7 +13,7 @@ BOX = '<geometry><box size="1 1 1"/></geometry>'
 MISTAKES = {
     "no joint type": (joint("j", "body", "x", "0 0 0", "hinge") + link("x"), "joint j: type: expected one of"),
     "unknown link": (joint("j", "body", "nowhere", "0 0 0", "fixed"), "expected a link of this file, got 'nowhere'"),
-    "two bases": (link("lonely"), "expected one link that is no child of a joint, got 'body', 'lonely'"),
+    "two bases": (link("lonely"), "expected one link that is not the child of a joint, got 'body', 'lonely'"),
     "twice": (link("body"), "expected a name of its own, got 'body' twice"),
     "no limit": (joint("j", "body", "x", "0 0 0", "revolute") + link("x"), "joint j: limit: expected an element"),
     "zero axis": (joint("j", "body", "x", "0 0 0", axis="0 0 0") + link("x"), "joint j: axis: expected a direction"),

@@ -197,7 +197,12 @@ NOTHING = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}
 @pytest.mark.parametrize(
     ("mapping", "goal", "outcome", "text"),
     [
-        (mbf.MOVE_BASE, {"target_pose": stamped(orientation=NOTHING)}, GetPathOutcome.INVALID_GOAL, "is no rotation"),
+        (
+            mbf.MOVE_BASE,
+            {"target_pose": stamped(orientation=NOTHING)},
+            GetPathOutcome.INVALID_GOAL,
+            "not a rotation",
+        ),
         (mbf.MOVE_BASE, {"target_pose": stamped({"x": None})}, GetPathOutcome.INVALID_GOAL, "must be finite"),
         (mbf.MOVE_BASE, {"target_pose": stamped({"x": math.inf})}, GetPathOutcome.INVALID_GOAL, "must be finite"),
         (mbf.GET_PATH, {"target_pose": stamped(orientation=NOTHING)}, GetPathOutcome.INVALID_GOAL, "target_pose"),

@@ -262,7 +262,7 @@ def test_two_entries_of_one_name_have_a_line_each_and_one_that_is_the_same_has_o
     table = join(Results(mine.head, mine.rows[:1]), others, INDOOR)
     assert [row["entry"] for row in table.rows] == list(table.entries) == ["a", "a (b.json)"]
     assert table.entries["a (b.json)"]["settings"] == {"planner": "y"}
-    assert table.origins[0] == "Left out of same.json, for the same entry is in the table: a."
+    assert table.origins[0] == "Left out of same.json, because the same entry is in the table: a."
     assert table.origins[1].endswith("planning times of that machine: a (b.json).")
 
 
