@@ -67,7 +67,7 @@ def _read_header(path: Path, file: BinaryIO) -> dict[str, list[str]]:
             header[words[0].upper()] = words[1:]
         if "DATA" in header:
             return header
-    raise MeshError(str(path), ["is no PCD: there is no DATA line in its header"])
+    raise MeshError(str(path), ["is not a PCD file: there is no DATA line in its header"])
 
 
 def _record(header: dict[str, list[str]]) -> np.dtype[np.void]:

@@ -394,7 +394,7 @@ def test_a_las_file_whose_keys_give_heights_another_unit_is_refused(tmp_path, ve
         ("a.ply", PLY_HEAD + b"element vertex 9\nend_header\n", "its points have no properties"),
         ("a.ply", TEXT_HEAD + b"element a 999999999999\n" + VERTEX + b"end_header\n", "cut off before its points"),
         ("a.ply", PLY_HEAD + b"element vertex 9\n" + 2 * b"property float x\n" + b"end_header\n", "cannot be read"),
-        ("a.pcd", b"VERSION 0.7\nFIELDS x y\nSIZE 4\nTYPE F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2\n", "no PCD header"),
+        ("a.pcd", b"VERSION 0.7\nFIELDS x y\nSIZE 4\nTYPE F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2\n", "not a PCD header"),
         ("a.pcd", b"nothing", "is not a PCD"),
         ("a.las", b"LASF" + bytes(100), "cut off within its header: expected at least 227 bytes, found 104"),
         ("a.las", bytes(300), "is cut off, damaged or no LAS"),
