@@ -1,17 +1,24 @@
-"""Leaves that look for a newer or another path while the robot drives."""
+"""What a robot does about who stands on its path, while it drives: a newer path, a detour, or by how they move."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Generator, Mapping
+from contextlib import suppress
 
+from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.leaves import GetPath
+from mbf_abstract.executives.nodes import Composite
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import (
     ActionResult,
     GetPathResult,
 )
+from mbf_abstract.maps.tracking.blocking import Blockage
+from mbf_abstract.maps.tracking.objects import Motion
 
 SAME_PLACE = 1.0
 """A detour that was asked for less than this far away [m] was asked for here."""
@@ -97,3 +104,60 @@ class Detour(UpdatePath):
     def is_too_long(self, length: float, present: float) -> bool:
         """A detour of a few metres costs less than to give way, however near the end of the path is."""
         return length > present + SHORT_DETOUR and super().is_too_long(length, present)
+
+
+class PickByMotion(Composite):
+    """Run the child for how the first tracked object on the path ahead moves. What the others remember stays.
+
+    Parameters
+    ----------
+    by_motion : mapping of Motion to Behaviour
+        A motion that is missing makes the node fail. One node may stand for several motions, and for nobody.
+    nobody : Behaviour
+        Where no tracked object is in the way.
+    length : float
+        How far ahead along the path [m] counts.
+    standing : float
+        What stands for less than this [s] counts as moving: it may have been seen for too short a time to know.
+    """
+
+    children_remember = True
+
+    def __init__(
+        self,
+        name: str,
+        by_motion: Mapping[Motion, Behaviour],
+        nobody: Behaviour,
+        length: float = 3.0,
+        standing: float = 0.0,
+    ) -> None:
+        super().__init__(name, list(dict.fromkeys([*by_motion.values(), nobody])))
+        self.by_motion = dict(by_motion)
+        self.nobody = nobody
+        self.length = length
+        self.standing = standing
+        self._picked: Behaviour | None = None
+
+    def initialise(self) -> None:
+        """Ask the map when entered; where it cannot say, nobody is in the way."""
+        first = self._first_in_the_way()
+        if first is None:
+            self._picked, self.feedback_message = self.nobody, "nobody"
+            return
+        motion = first.by.motion if first.by.standing >= self.standing else Motion.MOVING
+        self._picked = self.by_motion.get(motion)
+        self.feedback_message = f"{motion.value}, {first.distance:.1f} m ahead"
+
+    def _first_in_the_way(self) -> Blockage | None:
+        if self.mission.path is None:
+            return None
+        with suppress(TransformError, RobotStateError):
+            blockages = self.mission.navigator.server.queries.what_blocks(self.mission.path_to_follow())
+            return next((blockage for blockage in blockages if blockage.distance <= self.length), None)
+        return None
+
+    def tick_children(self) -> Generator[Behaviour, None, Status]:
+        """Tick the picked child."""
+        if self._picked is None:
+            return Status.FAILURE
+        return (yield from self.tick_child(self._picked))

@@ -9,17 +9,12 @@ are those of Nav2's nodes of that name, except that ``py_trees`` knows no "skipp
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Collection, Generator, Sequence
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.nodes import Composite, Decorator
-from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.maps.tracking.blocking import Blockage
-from mbf_abstract.maps.tracking.objects import Motion
 
 
 class TaskWithRecoveries(Composite):
@@ -185,63 +180,6 @@ class PickByOutcome(Composite):
         code = self.mission.failure_code
         self._picked = next((child for child in self.children if child.accepts(code)), None)
         self.feedback_message = f"code {code}: {self._picked.name if self._picked else 'nothing fits'}"
-
-    def tick_children(self) -> Generator[Behaviour, None, Status]:
-        """Tick the picked child."""
-        if self._picked is None:
-            return Status.FAILURE
-        return (yield from self.tick_child(self._picked))
-
-
-class PickByMotion(Composite):
-    """Run the child for how the first tracked object on the path ahead moves. What the others remember stays.
-
-    Parameters
-    ----------
-    by_motion : mapping of Motion to Behaviour
-        A motion that is missing makes the node fail. One node may stand for several motions, and for nobody.
-    nobody : Behaviour
-        Where no tracked object is in the way.
-    length : float
-        How far ahead along the path [m] counts.
-    standing : float
-        What stands for less than this [s] counts as moving: it may have been seen for too short a time to know.
-    """
-
-    children_remember = True
-
-    def __init__(
-        self,
-        name: str,
-        by_motion: Mapping[Motion, Behaviour],
-        nobody: Behaviour,
-        length: float = 3.0,
-        standing: float = 0.0,
-    ) -> None:
-        super().__init__(name, list(dict.fromkeys([*by_motion.values(), nobody])))
-        self.by_motion = dict(by_motion)
-        self.nobody = nobody
-        self.length = length
-        self.standing = standing
-        self._picked: Behaviour | None = None
-
-    def initialise(self) -> None:
-        """Ask the map when entered; where it cannot say, nobody is in the way."""
-        first = self._first_in_the_way()
-        if first is None:
-            self._picked, self.feedback_message = self.nobody, "nobody"
-            return
-        motion = first.by.motion if first.by.standing >= self.standing else Motion.MOVING
-        self._picked = self.by_motion.get(motion)
-        self.feedback_message = f"{motion.value}, {first.distance:.1f} m ahead"
-
-    def _first_in_the_way(self) -> Blockage | None:
-        if self.mission.path is None:
-            return None
-        with suppress(TransformError, RobotStateError):
-            blockages = self.mission.navigator.server.queries.what_blocks(self.mission.path_to_follow())
-            return next((blockage for blockage in blockages if blockage.distance <= self.length), None)
-        return None
 
     def tick_children(self) -> Generator[Behaviour, None, Status]:
         """Tick the picked child."""

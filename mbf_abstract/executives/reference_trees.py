@@ -21,20 +21,12 @@ from py_trees.common import ParallelPolicy
 from py_trees.composites import Parallel, Sequence
 
 from mbf_abstract.executives.conditions import BEYOND_RECOVERY, Do, recovery_would_help
-from mbf_abstract.executives.detours import Detour, UpdatePath
+from mbf_abstract.executives.detours import Detour, PickByMotion, UpdatePath
 from mbf_abstract.executives.escalation import Escalation
 from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery
 from mbf_abstract.executives.map_leaves import CheckPose, PathBlocked
 from mbf_abstract.executives.pacing import Delay, InBackground
-from mbf_abstract.executives.recovering import (
-    InOrder,
-    MemRec,
-    OutcomeGuard,
-    PickByMotion,
-    PickByOutcome,
-    RecoveryNode,
-    RoundRobin,
-)
+from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
 from mbf_abstract.executives.watchdogs import MotorWatchdog, OscillationWatchdog, ProgressWatchdog
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome

@@ -28,7 +28,8 @@ from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP
 from mbf_costmap_nav.kernels.search.grid_search import FOUND
 from mbf_costmap_nav.planning.car_search import CarLeg, CarWorld, Driving, search_drive
-from mbf_costmap_nav.planning.grid_planning import check_tolerance, heights_along, marked_if_permanent, off_map
+from mbf_costmap_nav.planning.grid_planning import check_tolerance, marked_if_permanent, off_map
+from mbf_costmap_nav.planning.path_assembly import heights_along
 from mbf_costmap_nav.plugins import CostmapPlanner
 
 FloatArray = NDArray[np.float64]

@@ -16,8 +16,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw
-from mbf_abstract.geometry.polyline import polyline_lengths
+from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import PlanRequest, PlanResult
@@ -25,6 +24,7 @@ from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.grid.costmap import INSCRIBED, Costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.planning.manoeuvres import Fitted
+from mbf_costmap_nav.planning.path_assembly import assembled, with_exact_ends
 from mbf_costmap_nav.planning.path_fitting import PathFitting, shifted_request
 from mbf_costmap_nav.planning.permanent_walls import is_permanently_unreachable
 from mbf_costmap_nav.planning.search_grid import Cell, GridPlannerParameters, SearchGrid, SearchWorkspace
@@ -32,8 +32,6 @@ from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
 
 FloatArray = NDArray[np.float64]
 
-NEAR_END = 0.75
-"""Points this near [cells] to an exact start or goal are dropped: going there first would be a step back."""
 DOES_NOT_FIT = (GetPathOutcome.BLOCKED_GOAL, GetPathOutcome.NO_PATH_FOUND)
 """Outcomes of a path whose end the outline does not fit at, or that it does not fit on."""
 
@@ -117,7 +115,7 @@ class GridPlanner(CostmapPlanner):
                 return answer
             fitted = answer
         # 4. One path of all legs.
-        path = _assemble(fitted, request, goal, grid.costmap.frame_id, self.clock.now())
+        path = assembled(fitted, request, goal, grid.costmap.frame_id, self.clock.now())
         message = f"{len(path)} poses, {path.length:.2f} m"
         off = math.dist(path.positions[-1][:2], (request.goal.x, request.goal.y))
         if not reached_goal or off > 1e-9:
@@ -150,7 +148,7 @@ class GridPlanner(CostmapPlanner):
                 failure = failure or _no_path(grid, start, goal, tolerance, name)
                 return marked_if_permanent(failure, self.costmap, start, goal, tolerance, self.parameters.lethal_cost)
             reached_goal = leg.reached_goal and grid.costmap.contains(goal.x, goal.y)
-            piece = _with_exact_ends(grid, leg.points, start, goal if reached_goal else None)
+            piece = with_exact_ends(grid, leg.points, start, goal if reached_goal else None)
             pieces.append(resample(piece, self.pose_spacing) if self.pose_spacing > 0.0 else piece)
             cost += leg.cost
         return pieces, cost, reached_goal
@@ -217,41 +215,3 @@ def _no_path(grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, name: 
         f"no path from ({start.x:.2f}, {start.y:.2f}) to the {name} ({goal.x:.2f}, {goal.y:.2f}), {distance:.2f} m away"
     )
     return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)
-
-
-def _with_exact_ends(grid: SearchGrid, points: FloatArray, start: Pose, goal: Pose | None) -> FloatArray:
-    """Replace the cell centres at the ends by the exact start, and by the exact goal if it was reached."""
-    points = _from_exactly(grid, np.array([start.x, start.y]), points)
-    return points if goal is None else _from_exactly(grid, np.array([goal.x, goal.y]), points[::-1])[::-1]
-
-
-def _from_exactly(grid: SearchGrid, exact: FloatArray, points: FloatArray) -> FloatArray:
-    """Begin with a point of the first point's cell instead of that point, and of what lies as near.
-
-    Where the line from there to the rest is blocked, all points are kept: a line within one cell is free.
-    """
-    if len(points) == 1:
-        return np.stack([exact, points[0]])
-    far = np.hypot(*(points[1:-1] - exact).T) > NEAR_END * grid.costmap.resolution
-    rest = points[1 + (int(np.argmax(far)) if far.any() else len(far)) :]
-    return np.vstack([exact, rest if grid.is_free_line(exact, rest[0]) else points])
-
-
-def heights_along(points: FloatArray, request: PlanRequest) -> FloatArray:
-    """Heights [m] of a path on a flat map: interpolated linearly from the start's to the goal's."""
-    along = polyline_lengths(points)
-    share = along / along[-1] if along[-1] > 0.0 else along
-    return np.asarray(request.start.z + share * (request.goal.z - request.start.z))
-
-
-def _assemble(pieces: list[Fitted], request: PlanRequest, goal: Pose, frame_id: str, stamp: float) -> Path:
-    """Join the legs; poses head along the path or as the manoeuvres do, the first and the last one as requested."""
-    points = np.concatenate([pieces[0].points, *(piece.points[1:] for piece in pieces[1:])])
-    yaws = np.concatenate([pieces[0].yaws, *(piece.yaws[1:] for piece in pieces[1:])])
-    path = Path.from_points(np.column_stack([points, heights_along(points, request)]), goal.orientation)
-    assert path.orientations is not None
-    orientations = path.orientations.copy()
-    for index in np.flatnonzero(~np.isnan(yaws[:-1])).tolist():
-        orientations[index] = quaternion_from_yaw(yaws[index])
-    orientations[0] = request.start.orientation
-    return Path(path.positions, orientations, frame_id, stamp)
