@@ -115,7 +115,8 @@ def test_only_cells_within_the_tolerance_are_tried(costmap):
 
 def test_a_goal_off_the_map_is_searched_from_the_border(costmap):
     goal = Pose.planar(-1.0, -1.0)
-    assert find_valid_pose(costmap, UNIT_SQUARE, goal, 0.5, 0.0).state is CellState.LETHAL
+    nothing = find_valid_pose(costmap, UNIT_SQUARE, goal, 0.5, 0.0)
+    assert nothing.state is CellState.OUTSIDE and nothing.pose is None
     border = find_valid_pose(costmap, UNIT_SQUARE.offset(0.1), goal, 2.13, 0.0)
     assert border.state is CellState.OUTSIDE and (border.pose.x, border.pose.y) == (0.5, 0.5)
 
