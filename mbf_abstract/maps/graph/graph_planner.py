@@ -14,6 +14,7 @@ from mbf_abstract.geometry import FloatArray, Path, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.graph.graph_map import BoolArray, GraphMap
 from mbf_abstract.maps.map_plugin import MapContext
+from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult
 
@@ -67,13 +68,14 @@ class GraphPlanner(AbstractPlanner):
         return np.concatenate([itself, near[np.argsort(gaps[near], kind="stable")]])
 
     def _refused(self, pose: Pose, name: str) -> PlanResult:
-        answer = self._map.place(pose.x, pose.y)
+        answer, node = self._map.place(pose.x, pose.y), self._map.node_at(pose.x, pose.y)
         place = f"the {name} ({pose.x:.2f}, {pose.y:.2f})"
-        if (node := self._map.node_at(pose.x, pose.y)) < 0:
+        if node < 0:
             return PlanResult(GetPathOutcome.OUT_OF_MAP, f"there is no ground at {place}")
-        if (gap := abs(pose.z - self._map.nodes[node, 2])) > OFF_GROUND:
-            text = f"{place} is {gap:.2f} m from the ground, allowed are {OFF_GROUND:g} m"
-            return PlanResult(GetPathOutcome.OUT_OF_MAP, text)
+        if answer.state is CellState.FREE:
+            height = float(self._map.nodes[node, 2])
+            text = f"{place} is {abs(pose.z - height):.2f} m from the ground, which is at z = {height:.2f} m"
+            return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{text}; allowed are {OFF_GROUND:g} m")
         return PlanResult(START if name == "start" else GOAL, f"{place} is {answer.state.name}, cost {answer.cost:.2f}")
 
     def _graph(self, free: BoolArray) -> Any:
