@@ -14,7 +14,7 @@ from itertools import pairwise
 
 from websockets.sync.client import connect
 
-from mbf_abstract.access.web_socket_server import ServerOptions
+from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.time.clock import WallClock, wall_seconds
 from mbf_ros.rosbridge.serving import BridgeOptions, serve_session

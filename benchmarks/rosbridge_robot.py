@@ -18,7 +18,7 @@ from pathlib import Path
 
 from websockets.sync.client import connect
 
-from mbf_abstract.access.web_socket_server import ServerOptions
+from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal, MoveBaseGoal
 from mbf_abstract.server.factory import read_config

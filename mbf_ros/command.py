@@ -76,7 +76,7 @@ def serve(
         refuse_without(context, "--foxglove", *NAMES)
     with readable_errors():
         from mbf_abstract.access.foxglove import FoxgloveOptions, live_robot
-        from mbf_abstract.access.web_socket_server import ServerOptions
+        from mbf_abstract.access.server_options import ServerOptions
         from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
         from mbf_ros.rosbridge_robot.simulated_robot import serve_robot
         from mbf_ros.sensor_options import sensors_of

@@ -13,7 +13,7 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from mbf_abstract.access.page_access import LOOPBACK, PageAccess, Role, is_loopback
-from mbf_abstract.access.web_socket_server import ServerOptions
+from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.session import NavigationSession
 
 LIVE_APPS_GROUP, FOXGLOVE = "mbf.live_apps", "foxglove"

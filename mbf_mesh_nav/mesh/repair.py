@@ -96,11 +96,11 @@ def checked_mesh(
     if len(mesh.faces) == 0:
         reasons.append("no face is left")
     if reasons:
-        raise MeshError(file, reasons, _way_out(check.report, repair) if len(mesh.faces) else "")
+        raise MeshError(file, reasons, _repair_hint(check.report, repair) if len(mesh.faces) else "")
     return mesh, check.report
 
 
-def _way_out(report: MeshReport, repair: Sequence[str]) -> str:
+def _repair_hint(report: MeshReport, repair: Sequence[str]) -> str:
     """How to allow the repairs that a refused mesh needs."""
     needed = [finding.name for finding in report.refusals]
     listed = ", ".join([*repair, *(name for name in needed if name not in repair)])

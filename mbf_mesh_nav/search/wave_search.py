@@ -30,7 +30,6 @@ STEP_SAMPLE = 64
 """The typical weight of an edge is the mean of one in so many."""
 COURSE_LOST = 0.005
 """A path so much costlier than its field, as a share, is looked for once more. Fields are right to 0.3 %."""
-
 AS_PREDICTED = 5e-4
 """A path that differs by no more from the distance of its field, as a share, is the one along which the wave came."""
 

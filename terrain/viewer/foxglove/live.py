@@ -11,7 +11,8 @@ from contextlib import ExitStack
 from typing import Protocol
 
 from mbf_abstract.access.foxglove import FoxgloveOptions, report_addresses
-from mbf_abstract.access.web_socket_server import Offer, ServerOptions, WebSocketServer
+from mbf_abstract.access.server_options import ServerOptions
+from mbf_abstract.access.web_socket_server import Offer, WebSocketServer
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import Event, EventBus
 from mbf_abstract.time.clock import WallClock

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mbf_abstract.access.web_socket_server import ServerOptions
+from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome

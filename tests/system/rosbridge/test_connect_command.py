@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mbf_abstract.access.page_access import PageAccess, Role
-from mbf_abstract.access.web_socket_server import ServerOptions
+from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.cli import make_app
 from mbf_abstract.geometry import Pose
 from mbf_abstract.server.factory import read_config

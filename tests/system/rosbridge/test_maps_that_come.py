@@ -5,7 +5,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from mbf_abstract.access.web_socket_server import ServerOptions
+from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.server.factory import read_config

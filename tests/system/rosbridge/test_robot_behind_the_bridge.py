@@ -8,7 +8,7 @@ from contextlib import suppress
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from mbf_abstract.access.web_socket_server import ServerOptions
+from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.geometry import Pose

@@ -5,7 +5,7 @@ import io
 import pytest
 from PIL import Image
 
-from mbf_abstract.access.web_socket_server import ServerOptions
+from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.geometry import Pose
 from mbf_abstract.server.factory import read_config
 from mbf_abstract.testing.loopback import LoopbackSession
