@@ -204,15 +204,16 @@ def cross_track_errors(recording: Recording) -> FloatArray:
 
 def _distances_to_polyline(points: FloatArray, line: FloatArray) -> FloatArray:
     """Distance (n,) of each point (n, 2) to the nearest piece of a polyline (m, 2)."""
-    starts, pieces = line[:-1], np.diff(line, axis=0)
-    if len(pieces) == 0:
+    if len(line) == 1:
         return np.asarray(norm(points - line[0]))
-    squared = np.maximum(np.sum(pieces**2, axis=1), 1e-12)
-    distances = np.empty(len(points))
-    for index, point in enumerate(points):  # n x m at once would need gigabytes on long runs
-        along = np.clip(np.sum((point - starts) * pieces, axis=1) / squared, 0.0, 1.0)
-        distances[index] = norm(starts + along[:, None] * pieces - point).min()
-    return distances
+    (x, y), (dx, dy) = line[:-1].T.copy(), np.diff(line, axis=0).T.copy()
+    squared = np.maximum(dx * dx + dy * dy, 1e-12)
+    least = np.empty(len(points))
+    for index, (px, py) in enumerate(points.tolist()):  # n x m at once would need gigabytes on long runs
+        along = np.minimum(np.maximum(((px - x) * dx + (py - y) * dy) / squared, 0.0), 1.0)
+        off_x, off_y = x + along * dx - px, y + along * dy - py
+        least[index] = (off_x * off_x + off_y * off_y).min()
+    return np.sqrt(least)
 
 
 def _length(points: FloatArray) -> float:

@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -101,6 +102,28 @@ def test_cross_track_error_is_measured_to_the_plan_of_the_time():
 
     np.testing.assert_allclose(errors[:5], 0.5)
     np.testing.assert_allclose(errors[5:], 0.2)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 7))
+def test_cross_track_errors_have_the_bytes_of_distances_taken_piece_by_piece(seed, count):
+    rng = np.random.default_rng(seed)
+    plan = rng.uniform(-5.0, 5.0, (count, 3))
+    plan[count // 2] = plan[0]  # a piece may be a point
+    run = replace(straight_run([]), paths=[(0.0, plan)])
+
+    expected = [_distance(x, y, plan[:, :2].tolist()) for x, y in run.poses[:, :2].tolist()]
+
+    assert cross_track_errors(run).tolist() == expected
+
+
+def _distance(px, py, line):
+    found = [math.sqrt((px - line[0][0]) ** 2 + (py - line[0][1]) ** 2)] if len(line) == 1 else []
+    for (ax, ay), (bx, by) in pairwise(line):
+        dx, dy = bx - ax, by - ay
+        along = min(max(((px - ax) * dx + (py - ay) * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
+        x, y = ax + along * dx - px, ay + along * dy - py
+        found.append(math.sqrt(x * x + y * y))
+    return min(found)
 
 
 def test_every_plan_counts_as_far_as_it_was_followed():
