@@ -28,9 +28,15 @@ def write_results(
         Why some could not be made: a package is missing, the disk is full, or one of them has a defect. What can be
         made is made.
     """
+    drawn: list[bytes] = []
+
+    def draw(file: Path) -> None:
+        drawn.append(picture_png(recording))  # the report shows it too
+        write_whole(file, drawn[0])
+
     makers: list[tuple[str, str, Callable[[Path], None]]] = [
-        ("drawing the picture", "picture.png", lambda file: write_whole(file, picture_png(recording))),
-        ("writing the report", "report.html", lambda file: write_whole(file, report_html(recording, metrics))),
+        ("drawing the picture", "picture.png", draw),
+        ("writing the report", "report.html", lambda file: write_whole(file, report_html(recording, metrics, *drawn))),
         ("writing the replay", "replay.html", lambda file: write_whole(file, replay_html(recording))),
         ("writing the log for Foxglove", "run.mcap", lambda file: _write_log(file, recording)),
     ]

@@ -4,7 +4,7 @@ A world of several storeys has a panel for each of them. Where the route takes o
 picture shows the route, and an inset where in the world it is. Plans are wide and dashed, tracks narrow and solid, so
 that no colour is needed to distinguish them.
 
-Use it for reports and READMEs; it takes about a second per hundred thousand triangles. For motion see
+Use it for reports and READMEs; it takes about a second. For motion see
 ``terrain.viewer.replay``.
 """
 
@@ -33,9 +33,10 @@ from terrain.viewer.pictures.picture import (
     draw_track,
     draw_triangles,
     panel_figure,
+    pixel_size,
     png_bytes,
 )
-from terrain.viewer.pictures.shading import shaded_triangles
+from terrain.viewer.pictures.shading import plain_triangles, shaded_triangles
 from terrain.viewer.pictures.shapes import standing_things
 from terrain.viewer.pictures.storeys import storeys
 from terrain.viewer.replay.world_mesh import coarse_faces
@@ -50,6 +51,7 @@ SMALL_ROUTE = 0.3  # of the world's area; a route whose box is smaller is shown 
 MARGIN = 0.15  # of the route's length, around it
 LEAST_SIDE = 0.5  # of the longer side of the route's box
 INSET_CELLS = 150  # along the longer side of an inset's world
+EDGE_WIDTH = 0.8  # pixels of the edges of what stands
 DASHES = (0, (3.0, 1.4))
 PLAN_WIDTH = 3.6
 INCIDENT_COLOUR = "#b00020"
@@ -143,16 +145,17 @@ def _route_extent(recording: Recording, whole: Extent) -> Extent:
 
 
 def _draw_world(panel: Panel, recording: Recording) -> None:
-    axes, ground = panel.axes, recording.ground
+    painted, ground, edge = [], recording.ground, EDGE_WIDTH * pixel_size(panel.axes)
     if ground is not None:
         heights = ground.vertices[ground.faces, 2].mean(axis=1)
-        draw_triangles(axes, *shaded_triangles(Surface(ground.vertices, ground.faces[heights < panel.cut])))
+        painted.append(shaded_triangles(Surface(ground.vertices, ground.faces[heights < panel.cut])))
     for name, surface, colour in standing_things(recording):
         lows, highs = _solid_bounds(surface)
         faces = surface.faces[(highs > panel.floor + 0.1) & (lows < panel.cut)]
         label = "on no map" if name == "obstacles" else None
-        _paint(axes, Surface(surface.vertices, faces), colour)
-        axes.plot([], [], "s", color=np.array(colour) / 255.0, markersize=9, label=label)
+        painted.append(plain_triangles(Surface(surface.vertices, faces), colour, edge))
+        panel.axes.plot([], [], "s", color=np.array(colour) / 255.0, markersize=9, label=label)
+    _paint(panel.axes, painted)
 
 
 def _solid_bounds(surface: Surface) -> tuple[FloatArray, FloatArray]:
@@ -167,9 +170,11 @@ def _solid_bounds(surface: Surface) -> tuple[FloatArray, FloatArray]:
     return lows[solid[a]], highs[solid[a]]
 
 
-def _paint(axes: Axes, surface: Surface, colour: Colour) -> None:
-    corners = surface.vertices[surface.faces][:, :, :2]
-    draw_triangles(axes, corners, np.tile(np.array(colour) / 255.0, (len(corners), 1)))
+def _paint(axes: Axes, things: list[tuple[FloatArray, FloatArray]]) -> None:
+    """Paint the triangles of all things, each over those before it."""
+    if things:
+        corners, colours = zip(*things, strict=True)
+        draw_triangles(axes, np.concatenate(corners), np.concatenate(colours))
 
 
 def _draw_actors(panel: Panel, recording: Recording) -> None:
@@ -219,19 +224,20 @@ def _caption(panel: Panel, number: int) -> None:
 def _draw_inset(axes: Axes, recording: Recording, robots: Iterable[Recording], whole: Extent, shown: Extent) -> None:
     """Beside the picture: all of the world, coarsely, with the frame of what the picture shows and the tracks."""
     inset = axes.inset_axes((1.02, 0.0, 0.3, 0.3))
-    ground = recording.ground
+    inset.set(xlim=whole[:2], ylim=whole[2:], aspect="equal", anchor="SW", xticks=[], yticks=[])
+    painted, ground = [], recording.ground
     if ground is not None:
         cell = max(whole[1] - whole[0], whole[3] - whole[2]) / INSET_CELLS
         faces = coarse_faces(ground, np.zeros(len(ground.vertices), np.uint8), cell).astype(np.int32)
-        draw_triangles(inset, *shaded_triangles(Surface(ground.vertices, faces)))
-    for _, surface, colour in standing_things(recording):
-        _paint(inset, surface, colour)
+        painted.append(shaded_triangles(Surface(ground.vertices, faces)))
+    edge = EDGE_WIDTH * pixel_size(inset)
+    painted += [plain_triangles(surface, colour, edge) for _, surface, colour in standing_things(recording)]
+    _paint(inset, painted)
     for robot in robots:
         inset.plot(robot.poses[:, 0], robot.poses[:, 1], color=np.array(DRIVEN) / 255.0, linewidth=1.0)
     x_min, x_max, y_min, y_max = shown
     x, y = [x_min, x_max, x_max, x_min, x_min], [y_min, y_min, y_max, y_max, y_min]
     inset.plot(x, y, color="#222222", linewidth=1.2)
-    inset.set(xlim=whole[:2], ylim=whole[2:], aspect="equal", anchor="SW", xticks=[], yticks=[])
 
 
 def _driven(recording: Recording) -> float:

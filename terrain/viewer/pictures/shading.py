@@ -48,6 +48,30 @@ def shaded_triangles(surface: Surface, colours: Colours | None = None) -> tuple[
     return surface.vertices[surface.faces][order][:, :, :2], lit_colours(surface, colours)[order] / 255.0
 
 
+def plain_triangles(surface: Surface, colour: Colour, edge: float) -> tuple[FloatArray, FloatArray]:
+    """Triangles seen from above in one colour, without light; their edges become lines, so that thin walls are seen.
+
+    Parameters
+    ----------
+    edge : float
+        Width of these lines [m].
+
+    Returns
+    -------
+    corners : (7 F, 3, 2) float64
+        x and y [m].
+    colours : (7 F, 3) float64
+        0..1.
+    """
+    corners = surface.vertices[surface.faces][:, :, :2]
+    begin, end = corners.reshape(-1, 2), np.roll(corners, -1, axis=1).reshape(-1, 2)
+    along = (end - begin) / np.maximum(np.linalg.norm(end - begin, axis=1), 1e-12)[:, None]
+    aside = 0.5 * edge * np.column_stack([-along[:, 1], along[:, 0]])
+    a, b, c, d = begin - aside, end - aside, end + aside, begin + aside
+    corners = np.concatenate([corners, np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return corners, np.tile(np.array(colour) / 255.0, (len(corners), 1))
+
+
 def lit_colours(surface: Surface, colours: Colours | Colour | None = None) -> FloatArray:
     """Colours (F, 3) 0..255 of the faces in the light; ``colours`` as for ``face_colours``."""
     normals = face_normals(surface)

@@ -32,11 +32,17 @@ LAYERS_TEXT = (
 )
 
 
-def report_html(recording: Recording, metrics: Mapping[str, Any]) -> str:
-    """Return the page's text; raises ViewerMissing without matplotlib."""
+def report_html(recording: Recording, metrics: Mapping[str, Any], drawn: bytes | None = None) -> str:
+    """Return the page's text; raises ViewerMissing without matplotlib.
+
+    Parameters
+    ----------
+    drawn : bytes, optional
+        What ``picture_png`` gave for this recording, if it has been drawn already.
+    """
     parts = [
         summary(recording),
-        picture(recording),
+        picture(recording, drawn),
         layers(recording),
         "<h2>Over time</h2>" + plots_svg(recording) if len(recording.times) else "",
         f"<h2>Actions and plugins</h2>{timeline_svg(recording.events)}",
@@ -61,9 +67,9 @@ def summary(recording: Recording) -> str:
     )
 
 
-def picture(recording: Recording) -> str:
-    """The run from above."""
-    data = base64.b64encode(picture_png(recording)).decode("ascii")
+def picture(recording: Recording, drawn: bytes | None = None) -> str:
+    """The run from above; ``drawn`` as in ``report_html``."""
+    data = base64.b64encode(drawn or picture_png(recording)).decode("ascii")
     return f'<img alt="map, plan and driven track from above" src="data:image/png;base64,{data}">'
 
 

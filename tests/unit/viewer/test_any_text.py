@@ -1,5 +1,6 @@
 """No text of a run, whatever is in it, keeps its results from being made whole."""
 
+import base64
 import io
 import json
 from dataclasses import replace
@@ -25,6 +26,7 @@ from terrain.recording.verdict import judge
 from terrain.scenarios.limits import Limits
 from terrain.viewer import results
 from terrain.viewer.pictures.animation import write_animation
+from terrain.viewer.pictures.run_picture import picture_png
 from terrain.viewer.results import write_results
 
 TEXTS = [
@@ -78,6 +80,18 @@ def test_what_cannot_be_made_is_reported_and_the_rest_is_made(hill_recording, tm
 
     assert problems == ["picture.png could not be made: ValueError: no ink"]
     assert {file.name for file in tmp_path.iterdir()} == {"report.html", "replay.html", "run.mcap"}
+
+
+def test_the_report_shows_the_picture_that_has_been_drawn(hill_recording, tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(results, "picture_png", lambda recording: drawn.append(recording) or picture_png(recording))
+    monkeypatch.delattr("terrain.viewer.reports.report.picture_png")
+
+    assert write_results(tmp_path, hill_recording, {}) == []
+
+    data = base64.b64encode((tmp_path / "picture.png").read_bytes()).decode()
+    assert data in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert drawn == [hill_recording]
 
 
 def test_a_file_that_could_not_be_written_whole_stays_as_it_was(tmp_path):

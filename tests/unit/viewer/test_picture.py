@@ -28,7 +28,7 @@ from terrain.viewer.pictures.colours import (
     linear_for_viewer,
     slope_colours,
 )
-from terrain.viewer.pictures.picture import round_length
+from terrain.viewer.pictures.picture import draw_triangles, new_figure, round_length
 from terrain.viewer.pictures.run_picture import INCIDENT_COLOUR, joint_picture_png, picture_png
 from terrain.viewer.pictures.shading import face_colours, face_normals, shaded_triangles, vertex_colours
 from terrain.worlds.multi_level import STOREY
@@ -58,6 +58,35 @@ def test_the_picture_of_an_office_shows_where_people_have_been(office_recording)
 
     assert count(with_person, ACTORS["person"]) > 100
     assert count(pixels_of(picture_png(office_recording)), ACTORS["person"]) == 0
+
+
+def test_triangles_become_one_image_in_which_later_ones_cover_earlier_ones():
+    figure, axes = new_figure((0.0, 2.0, 0.0, 1.0))
+    left, right = [[0, 0], [1, 0], [0, 1]], [[2, 0], [2, 1], [1, 1]]
+    colours = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)])
+
+    draw_triangles(axes, np.array([left, left, right], dtype=np.float64), colours)
+
+    (image,) = axes.images
+    pixels = np.asarray(image.get_array())
+    shown = [tuple(pixels[int((1.0 - y) * len(pixels)), int(0.5 * x * pixels.shape[1])]) for x, y in PLACES]
+    assert not axes.collections
+    assert shown == [(0, 0, 255, 255), (0, 255, 0, 255), (0, 0, 0, 0)]
+    assert figure.get_axes() == [axes]
+
+
+PLACES = [(0.2, 0.2), (1.8, 0.8), (1.0, 0.5)]
+
+
+def test_a_wall_thinner_than_a_pixel_is_seen(office_recording):
+    a, b = (2.0, 9.0), (2.0005, 11.0)
+    corners = np.array([(*a, 1.0), (b[0], a[1], 1.0), (*b, 1.0), (a[0], b[1], 1.0)])
+    thin = Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    open_room = replace(office_recording, walls=None, obstacles=None)
+
+    without, with_wall = (pixels_of(picture_png(run)) for run in (open_room, replace(open_room, walls=thin)))
+
+    assert np.count_nonzero(without.sum(axis=2) - with_wall.sum(axis=2) > 150) > 50
 
 
 def test_the_picture_of_hills_is_written_to_the_file(hill_recording, tmp_path):
