@@ -12,7 +12,7 @@ import typer
 from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, READ_ONLY, TOKEN, refuse_without
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.commands.waiting import waiting
-from mbf_ros.ending import wait_for_ctrl_c
+from mbf_ros.ending import Parent, wait_for_ctrl_c
 from mbf_ros.rosbridge_robot.command import connect
 from mbf_ros.serving_options import KEEP_GOALS, MAP_PERIOD, SENSORS, STAMPED
 
@@ -74,6 +74,7 @@ def serve(
     """Serve a navigator, or a simulated robot alone, to clients of rosbridge, until Ctrl-C."""
     if not foxglove:
         refuse_without(context, "--foxglove", *NAMES)
+    parent = Parent()
     with readable_errors():
         from mbf_abstract.access.foxglove import FoxgloveOptions, live_robot
         from mbf_abstract.access.server_options import ServerOptions
@@ -95,7 +96,7 @@ def serve(
         with session, served as server:
             _report(server, options, robot is not None)
             with live_robot(app, session, session.navigator.send, Path(what).stem, typer.echo):
-                wait_for_ctrl_c()
+                wait_for_ctrl_c(parent)
 
 
 def _access(host: str, token: bool) -> PageAccess:

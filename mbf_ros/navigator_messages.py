@@ -17,6 +17,7 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.maps.view import FieldView
 from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import Clock
@@ -33,7 +34,11 @@ ROBOT_PERIOD, DIAGNOSTICS_PERIOD = 0.1, 1.0  # s
 
 PLAN = Output("plan", "nav_msgs/Path", Quality.LATCHED, depth=1, always=True)
 GOAL = Output("~/current_goal", "geometry_msgs/PoseStamped", Quality.LATCHED, depth=1, always=True)
-VECTOR_FIELD = Output("~/vector_field", "visualization_msgs/MarkerArray", Quality.LATCHED, depth=1)
+FIELDS: dict[Output, Callable[[FieldView, str, float, MessageContext], Message]] = {
+    Output("~/vector_field", "visualization_msgs/MarkerArray", Quality.LATCHED, depth=1): maps.field_markers,
+    Output("~/mesh_vector_field", "mesh_msgs/VectorFieldStamped", Quality.LATCHED, depth=1): maps.vector_field,
+}
+"""Directions of the newest plan: for RViz without plugins, and for that of mesh_tools."""
 LOCAL_PLAN = Output("local_plan", "nav_msgs/Path")
 FOOTPRINT = Output("~/footprint", "geometry_msgs/PolygonStamped")
 DIAGNOSTICS = Output("/diagnostics", "diagnostic_msgs/DiagnosticArray", shared=True)
@@ -78,7 +83,7 @@ class NavigatorMessages:
         self._session, self._server = session, session.navigator.server
         self._real_time, self._context, self._audience, self._inputs = real_time, context, audience, inputs
         self._maps = map_messages(self._server, context, audience)
-        own = (PLAN, GOAL, VECTOR_FIELD, LOCAL_PLAN, FOOTPRINT, DIAGNOSTICS, EVENTS)
+        own = (PLAN, GOAL, *FIELDS, LOCAL_PLAN, FOOTPRINT, DIAGNOSTICS, EVENTS)
         self.outputs: tuple[Output, ...] = (*own, *(output for one in self._maps for output in one.outputs))
         self._periodic = (
             (map_period, self._map_messages),
@@ -89,7 +94,7 @@ class NavigatorMessages:
         self._events: deque[Event] = deque(maxlen=MAX_EVENTS)
         self._plan: Path | None = None
         self._shown_plan: Path | None = None
-        self._shown_field: tuple[Path, int] | None = None  # its plan, and how many had begun to listen
+        self._shown_fields: dict[str, tuple[Path, int]] = {}  # the plan of each, and how many had begun to listen
         self._goal: Pose | None = None
         self._initial_poses: deque[Pose] = deque(maxlen=1)
         if robot_localizes:
@@ -132,16 +137,18 @@ class NavigatorMessages:
             self._plan = handle.result.path
 
     def _plan_messages(self) -> Iterator[tuple[str, Message]]:
-        plan, audience = self._plan, self._audience(VECTOR_FIELD.topic)
+        plan = self._plan
         if plan is None:
             return
         if plan is not self._shown_plan:
             self._shown_plan = plan
             yield PLAN.topic, path_message(plan, self._context())
-        if audience.listeners and self._shown_field != (plan, audience.joined):
-            self._shown_field = plan, audience.joined
-            if (view := self._server.field_view(plan)) is not None:
-                yield VECTOR_FIELD.topic, maps.field_markers(view, plan.frame_id, plan.stamp, self._context())
+        for output, message in FIELDS.items():
+            audience = self._audience(output.topic)
+            if audience.listeners and self._shown_fields.get(output.topic) != (plan, audience.joined):
+                self._shown_fields[output.topic] = plan, audience.joined
+                if (view := self._server.field_view(plan)) is not None:
+                    yield output.topic, message(view, plan.frame_id, plan.stamp, self._context())
 
     def _goal_messages(self) -> Iterator[tuple[str, Message]]:
         unfinished = self._server.move_base.unfinished

@@ -138,6 +138,14 @@ def field_markers(view: FieldView, frame_id: str, stamp: float, context: Message
     return {"markers": [marker]}
 
 
+def vector_field(view: FieldView, frame_id: str, stamp: float, context: MessageContext) -> Message:
+    """Return the directions of a plan as a mesh_msgs/VectorFieldStamped: unit vectors where they begin."""
+    return {
+        "header": context.header(frame_id, stamp),
+        "vector_field": {"positions": points(view.points), "vectors": points(view.directions)},
+    }
+
+
 def _color(rgb: Any) -> Message:
     return {"r": rgb[0], "g": rgb[1], "b": rgb[2], "a": 1.0}
 

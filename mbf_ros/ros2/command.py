@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import signal
 import sysconfig
-import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +11,7 @@ import typer
 from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, READ_ONLY, TOKEN, refuse_without
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from mbf_abstract.commands.waiting import waiting
-from mbf_ros.ending import shown_state
+from mbf_ros.ending import Parent, noticed_ctrl_c, shown_state
 from mbf_ros.serving_options import KEEP_GOALS, MAP_PERIOD, MAX_SILENCE, NODE_SENSORS
 
 if TYPE_CHECKING:
@@ -54,6 +52,7 @@ def ros2(
     """Serve a navigator as the ROS 2 node move_base_flex, until Ctrl-C."""
     if not foxglove:
         refuse_without(context, "--foxglove", *NAMES)
+    parent = Parent()
     with readable_errors():
         from mbf_abstract.access.foxglove import FoxgloveOptions, live_robot
         from mbf_ros.ros2.node import navigation_node
@@ -75,7 +74,7 @@ def ros2(
             navigation_node(config, options) as node,
             live_robot(app, node.session, node.go_to, config.stem, typer.echo),
         ):
-            _wait_for_end(node)
+            _wait_for_end(node, parent)
     if node.failure:
         typer.echo(f"error: the node has stopped the robot and ended: {node.failure}", err=True)
         raise typer.Exit(FAILURE)
@@ -98,13 +97,10 @@ def ros2_interfaces(
             typer.echo(f"{package}: {target}")
 
 
-def _wait_for_end(node: NavigationNode) -> None:
-    """Wait for Ctrl-C or a fault; SIGTERM ends the program by an exception, see ``server.process_end``."""
-    pressed = threading.Event()
-    before = signal.signal(signal.SIGINT, lambda number, stack: pressed.set())
+def _wait_for_end(node: NavigationNode, parent: Parent) -> None:
+    """Wait for Ctrl-C, the end of the parent or a fault."""
     look = shown_state(node.problem, typer.echo)
-    try:
+    with noticed_ctrl_c() as pressed:
         while not pressed.is_set() and not node.wait(0.1):
             look()
-    finally:
-        signal.signal(signal.SIGINT, before)
+            parent.end_without()

@@ -12,17 +12,25 @@ from typing import Any
 from mbf_abstract.config.configuration import PLUGIN_LISTS
 from mbf_abstract.config.navigation_parameters import READ_ONCE, NavigationParameters
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_ros.robot_inputs import ODOM
 
 NOT_VALUES = ("restore_defaults",)
 """Commands among the parameters, which keep no value."""
 
 
 class NodeParameters:
-    """Declares the parameters of a server on a node; raises ValueError where a given value cannot be used."""
+    """Declares the parameters of a server on a node; raises ValueError where a given value cannot be used.
+
+    Attributes
+    ----------
+    odom_topic : str
+        Topic of odometry; read once, at the start.
+    """
 
     def __init__(self, node: Any, server: AbstractNavigationServer) -> None:
         self._node, self._server = node, server
         self._declare_plugins()
+        self.odom_topic: str = self._declare("odom_topic", ODOM, "Topic of odometry.", read_only=True)
         changes = {}
         for name, field in NavigationParameters.model_fields.items():
             if name not in NOT_VALUES:

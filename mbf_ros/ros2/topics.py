@@ -18,33 +18,41 @@ from mbf_ros.navigator_messages import NavigatorMessages
 from mbf_ros.robot_inputs import Input, Quality
 from mbf_ros.ros2.conversion import MissingInterfaceError, fill, interface_class, to_dict
 
-CMD_VEL = "cmd_vel"
+CMD_VEL, OWN_CMD_VEL = "cmd_vel", "~/cmd_vel"
 PERIOD = 0.05  # s between two looks at what is new
 WARN_PERIOD = 5.0  # s between two warnings about messages of one topic
 
 
 class CommandTopic:
-    """Publishes commands on ``cmd_vel``, as Twist or TwistStamped in the robot's frame."""
+    """Publishes commands on ``cmd_vel``, as Twist or TwistStamped in the robot's frame.
+
+    As Move Base Flex does, also on ``~/cmd_vel``, always as TwistStamped; where somebody listens.
+    """
 
     def __init__(
         self, node: Any, stamped: bool, robot_frame: str, clock: Clock, context: Callable[[], MessageContext]
     ) -> None:
-        self._class = interface_class("geometry_msgs/TwistStamped" if stamped else "geometry_msgs/Twist")
-        self._stamped, self._frame, self._clock, self._context = stamped, robot_frame, clock, context
+        stamped_class = interface_class("geometry_msgs/TwistStamped")
+        self._class = stamped_class if stamped else interface_class("geometry_msgs/Twist")
+        self._stamped_class, self._stamped = stamped_class, stamped
+        self._frame, self._clock, self._context = robot_frame, clock, context
         self._publisher = node.create_publisher(self._class, CMD_VEL, 10)
+        self._own = node.create_publisher(stamped_class, OWN_CMD_VEL, 10)
 
     def publish(self, command: Command) -> None:
         """Publish a command; does not wait."""
         value = command_twist(command)
-        now = self._clock.now()
-        message = twist_stamped(value, self._frame, now, self._context()) if self._stamped else twist(value)
-        self._publisher.publish(fill(self._class(), message))
+        with_stamp = twist_stamped(value, self._frame, self._clock.now(), self._context())
+        self._publisher.publish(fill(self._class(), with_stamp if self._stamped else twist(value)))
+        if self._own.get_subscription_count():
+            self._own.publish(fill(self._stamped_class(), with_stamp))
 
     def wait_until_sent(self, seconds: float) -> None:
         """Wait until all who listen have the last command, for at most ``seconds``."""
         from rclpy.duration import Duration
 
-        self._publisher.wait_for_all_acked(Duration(seconds=seconds))
+        for publisher in (self._publisher, self._own):
+            publisher.wait_for_all_acked(Duration(seconds=seconds))
 
 
 def profile(quality: Quality, depth: int) -> Any:

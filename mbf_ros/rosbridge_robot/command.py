@@ -8,7 +8,7 @@ import typer
 
 from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, READ_ONLY, TOKEN, refuse_without
 from mbf_abstract.commands.reporting import readable_errors
-from mbf_ros.ending import shown_state, wait_for_ctrl_c
+from mbf_ros.ending import Parent, shown_state, wait_for_ctrl_c
 from mbf_ros.rosbridge_robot.options import LinkOptions, RobotOptions, TimeSource
 from mbf_ros.serving_options import MAX_SILENCE, SENSORS, STAMPED
 
@@ -42,6 +42,7 @@ def connect(
     """Navigate a robot through its rosbridge server, until Ctrl-C."""
     if not foxglove:
         refuse_without(context, "--foxglove", *NAMES)
+    parent = Parent()
     with readable_errors():
         from mbf_abstract.access.foxglove import FoxgloveOptions, live_robot
         from mbf_ros.rosbridge_robot.navigator import connect_navigator
@@ -52,7 +53,7 @@ def connect(
         options = RobotOptions(link, stamped, max_silence or None, sensors_of(sensor), cloud_period, time)
         with connect_navigator(address, config, options, _warn) as navigator:
             with live_robot(app, navigator.session, navigator.go_to, config.stem, typer.echo):
-                wait_for_ctrl_c(shown_state(navigator.problem, typer.echo), LOOK_PERIOD)
+                wait_for_ctrl_c(parent, shown_state(navigator.problem, typer.echo), LOOK_PERIOD)
 
 
 def _warn(text: str) -> None:

@@ -31,12 +31,12 @@ recovery_behaviors: [{name: pause, type: wait}]
 class Peer:
     """A process that writes JSON, one value a line, and takes orders on its standard input; its log is in ``logs``."""
 
-    def __init__(self, folder, domain, logs, *command, program=None, **variables):
+    def __init__(self, folder, domain, logs, *command, program=None, before=(), **variables):
         program = program or str(folder / "venv" / "bin" / "python")
         self._log = open(logs / f"{Path(command[0]).stem}.txt", "a")
         self._over = False
         self.process = subprocess.Popen(
-            [program, *command],
+            [*before, program, *command],
             env={**clean_variables(folder, domain), "ROS_LOG_DIR": str(logs), **variables},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -78,6 +78,11 @@ class Peer:
     def wait_for_end(self):
         """Wait for the end of the process; returns its code."""
         return self.process.wait(WITHIN)
+
+    def wait_for_last_line(self):
+        """Wait until nobody can write a line any more, neither the process nor its children."""
+        self._thread.join(WITHIN)
+        assert not self._thread.is_alive()
 
     def kill(self):
         """As kill -9 does."""
@@ -202,10 +207,10 @@ class Trio:
     def start_robot(self):
         self.robot = self._start(Robot, *self._robot_arguments)
 
-    def start_node(self, *options):
+    def start_node(self, *options, before=()):
         arguments = *self._options, *options, *self._node_arguments
         command = str(PEERS / "node.py"), str(self.file), *arguments
-        self.node = self._start(Peer, *command, folder=self._node_folder, **BRIEF_LEASE)
+        self.node = self._start(Peer, *command, folder=self._node_folder, before=before, **BRIEF_LEASE)
 
     def kill_node(self):
         """Kill the node, and wait until the client has noticed.

@@ -13,7 +13,7 @@ from mbf_ros.ros2.interfaces.definitions import types_of
 from tests.system.ros2.conftest import ROBOT
 from tests.system.ros2.environments import JAZZY, KILTED
 
-pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900, func_only=True)]
 PAIRS = [("kilted", "kilted"), ("kilted", "jazzy"), ("jazzy", "kilted")]
 OPTIONS = ("--max-silence", "5")  # a machine that is busy keeps the robot silent for longer than is usual
 CONFIG = ROBOT.replace("type: wait}", "type: wait}, {name: long_pause, type: wait}")
@@ -79,7 +79,7 @@ def test_the_compiled_types_have_the_hashes_of_the_released_packages(distributio
 def test_the_robot_drives_to_a_goal_with_feedback_on_its_way(trio):
     start, x = len(trio.robot.lines), trio.robot.x + 1.0
     goal = trio.client.send("move_base", target=[x, 0.0])
-    assert trio.client.wait(goal, "feedback")["dist"] > 0.5
+    assert 0.0 < trio.client.wait(goal, "feedback")["dist"] < 1.2  # of a busy client the first ones may be lost
     end = trio.client.wait(goal, "result")
     assert (end["status"], end["outcome"]) == ("succeeded", MoveBaseOutcome.SUCCESS)
     trio.robot.wait_for(lambda line: line.get("speed") == 0.0 and abs(line["x"] - x) < 0.3, start)

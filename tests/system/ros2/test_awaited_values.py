@@ -7,7 +7,7 @@ import pytest
 from tests.system.ros2.conftest import PEERS, folder_of
 from tests.system.ros2.environments import JAZZY, KILTED, clean_variables
 
-pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900, func_only=True)]
 LONG = 60.0  # s; ends who is not woken
 
 

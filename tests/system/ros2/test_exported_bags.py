@@ -14,7 +14,7 @@ from tests.system.ros2.conftest import PEERS, WITHIN
 from tests.system.ros2.environments import clean_variables
 from tests.unit.bags.test_export import make_log
 
-pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900, func_only=True)]
 
 
 def test_rclpy_reads_every_type_of_an_exported_bag_as_we_do(tmp_path, ros_folder):

@@ -8,11 +8,11 @@ import pytest
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
 from tests.system.ros2.conftest import ROBOT
 
-pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900, func_only=True)]
 CONFIG = ROBOT.replace("type: keepout}]", "type: keepout}, {name: seen, type: obstacle}]").replace(
     "area: {zones: []}", "area: {zones: []}, seen: {sources: {scan: {}}}"
 )
-OPTIONS = ("--no-nav2",)
+OPTIONS = ("--no-nav2", "--max-silence", "5")  # on a busy machine a robot is silent for longer than is usual
 ROUND, ROUNDS = 500, 8
 GROWTH = 5  # kB a goal: a third of what a goal takes with its result, which rclpy keeps for 10 s
 
@@ -111,6 +111,17 @@ def test_zero_is_the_last_command_of_a_node_that_is_ended(trio, number, code):
     trio.node.process.send_signal(number)
     assert trio.client.wait(goal, "result")["status"] == "aborted"
     assert trio.node.wait_for_end() == code
+    trio.robot.wait_until_last_speed_is_zero()
+
+
+def test_zero_is_the_last_command_of_a_node_whose_parent_is_killed(trio):
+    trio.kill_node()
+    trio.start_node(before=("sh", "-c", '"$0" "$@"; true'))
+    trio.wait_until_ready()
+    goal = trio.drive()
+    trio.node.process.kill()
+    assert trio.client.wait(goal, "result")["status"] == "aborted"
+    trio.node.wait_for_last_line()
     trio.robot.wait_until_last_speed_is_zero()
 
 

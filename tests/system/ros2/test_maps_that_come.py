@@ -8,7 +8,7 @@ import pytest
 from tests.system.ros2.conftest import PEERS, ROBOT, WITHIN, Peer, Trio
 from tests.unit.viewer.foxglove.conftest import Client as App
 
-pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900, func_only=True)]
 
 LAYERS = "layers: [{name: area, type: keepout}]"
 CONFIG = ROBOT.replace(LAYERS, "layers: [{name: area, type: keepout}, {name: walls, type: static}]").replace(

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900, func_only=True)]
 CLIENT, OPTIONS = "commander.py", ("--amcl",)
 CONFIG = """
 backend: costmap

@@ -14,12 +14,14 @@ from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_ros.messages import nav2_codes as codes
 from tests.system.ros2.conftest import Trio
 
-pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
-CLIENT, OPTIONS = "commander.py", ("--amcl",)
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900, func_only=True)]
+CLIENT = "commander.py"
+OPTIONS = ("--amcl", "--max-silence", "5")  # a behavior ends where the robot falls silent, as on a busy machine
 PLUGINS = """
 controller_patience: 60.0
 planner_patience: 60.0
 recovery_patience: 60.0
+tf_timeout: 10.0
 max_vel_x: 0.5
 recovery_behaviors:
   - {name: pause, type: wait}

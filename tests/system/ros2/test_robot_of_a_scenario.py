@@ -16,7 +16,7 @@ from mbf_abstract.outcomes import MoveBaseOutcome
 from tests.system.ros2.conftest import PEERS, WITHIN, Client, Peer
 from tests.system.ros2.environments import free_domain
 
-pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900, func_only=True)]
 LIBRARY = Path(terrain.scenarios.scenario.__file__).parent / "library"
 INDOOR = f"""
 name: to_the_door

@@ -11,7 +11,7 @@ from mbf_abstract.outcomes import GetPathOutcome, MoveBaseOutcome
 from tests.system.ros2.conftest import PEERS, ROBOT, Client, Peer, Robot
 from tests.system.ros2.environments import MBF, free_domain
 
-pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900, func_only=True)]
 SUCCEEDED, CANCELED = ("succeeded", MoveBaseOutcome.SUCCESS), ("canceled", MoveBaseOutcome.CANCELED)
 
 

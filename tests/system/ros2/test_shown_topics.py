@@ -10,7 +10,7 @@ import trimesh
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from tests.system.ros2.conftest import PEERS, Peer
 
-pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900, func_only=True)]
 
 SPOT = "[[3.02, -2.98], [3.38, -2.98], [3.38, -2.62], [3.02, -2.62]]"
 CONFIG = """
@@ -36,10 +36,10 @@ mesh_map: {{mesh_file: floor.ply, inscribed_radius: 0.3, default_layer: all,
   layers: [{{name: area, type: keepout}}, {{name: seen, type: obstacle}},
     {{name: all, type: max_combination, inputs: [area, seen]}}],
   area: {{regions: [{{polygon: {SPOT}}}]}}, seen: {{sources: [scan]}}}}
-planners: [{{name: shortest, type: dijkstra}}]
+planners: [{{name: shortest, type: cvp}}]
 controllers: [{{name: follow, type: follow_path}}]
 """
-OPTIONS = ("--no-nav2",)
+OPTIONS = ("--no-nav2", "--max-silence", "5")
 NODE = "/move_base_flex"
 OF_BOTH = {
     "/plan": ("nav_msgs/Path", "latched"),
@@ -48,6 +48,7 @@ OF_BOTH = {
     f"{NODE}/current_goal": ("geometry_msgs/PoseStamped", "latched"),
     f"{NODE}/footprint": ("geometry_msgs/PolygonStamped", "volatile"),
     f"{NODE}/events": ("std_msgs/String", "volatile"),
+    f"{NODE}/cmd_vel": ("geometry_msgs/TwistStamped", "volatile"),
 }
 GRID, UPDATES = "/global_costmap/costmap", "/global_costmap/costmap_updates"
 OF_COSTMAP = {
@@ -59,6 +60,8 @@ OF_MESH = {
     f"{NODE}/mesh": ("mesh_msgs/MeshGeometryStamped", "latched"),
     f"{NODE}/vertex_costs": ("mesh_msgs/MeshVertexCostsStamped", "latched"),
     f"{NODE}/mesh_markers": ("visualization_msgs/MarkerArray", "latched"),
+    f"{NODE}/vector_field": ("visualization_msgs/MarkerArray", "latched"),
+    f"{NODE}/mesh_vector_field": ("mesh_msgs/VectorFieldStamped", "latched"),
 }
 
 
@@ -100,6 +103,8 @@ def drive_and_look(trio, listener):
     )
     states = {state["name"].removeprefix("move_base_flex: "): state for state in array["status"]}
     assert {"input odom", "input scan", "velocity gate", "planner 'shortest'", "controller 'follow'"} <= set(states)
+    command = listener.wait_for_message(f"{NODE}/cmd_vel", lambda one: one["twist"]["linear"]["x"] > 0.0)
+    assert command["header"]["frame_id"] == "base_link" and command["header"]["stamp"]["sec"] > 0
     assert trio.cancel(goal)["status"] == "canceled"
     event = listener.wait_for_message(f"{NODE}/events", lambda one: "goal_finished" in one["data"])
     assert json.loads(event["data"])["kind"] == "goal_finished"
@@ -150,7 +155,7 @@ def test_a_costmap_is_published_as_a_whole_and_then_by_its_changes(trio, listene
 
 def test_a_mesh_is_published_with_its_costs_and_as_coloured_triangles(trio, listener):
     trio.kill_node()
-    vertices, faces = heightfield_mesh(np.zeros((101, 101)), 0.2, 0.2)
+    vertices, faces = heightfield_mesh(np.zeros((51, 51)), 0.4, 0.4)  # markers are slow to read in rclpy
     trimesh.Trimesh(vertices - [10.0, 10.0, 0.1], faces, process=False).export(trio.file.parent / "floor.ply")
     trio.file.write_text(MESH)
     trio.start_node()
@@ -175,3 +180,6 @@ def test_a_mesh_is_published_with_its_costs_and_as_coloured_triangles(trio, list
     listener.wait_for_message(f"{NODE}/vertex_costs", lambda one: is_wall(forbidden(one)), before)
     (marker,) = listener.wait_for_message(f"{NODE}/mesh_markers")["markers"]
     assert len(marker["points"]) == len(marker["colors"]) == 3 * len(geometry["faces"])
+    (lines,) = listener.wait_for_message(f"{NODE}/vector_field")["markers"]
+    field = listener.wait_for_message(f"{NODE}/mesh_vector_field")["vector_field"]
+    assert len(field["positions"]) == len(field["vectors"]) == len(lines["points"]) / 2 > 0

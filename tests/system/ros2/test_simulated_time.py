@@ -7,7 +7,7 @@ import pytest
 from mbf_abstract.outcomes import MoveBaseOutcome
 
 SIMULATED, OPTIONS = True, ("--no-nav2",)
-pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900, func_only=True)]
 
 
 def test_goals_end_with_tf_error_when_simulated_time_jumps_back_and_the_next_one_works(trio):

@@ -26,6 +26,9 @@ MESSAGES = {
     "geometry_msgs/PolygonStamped": maps.polygon(np.eye(3), "map", 1.5, CONTEXT),
     "mesh_msgs/MeshGeometryStamped": maps.mesh_geometry(MESH, "mbf", "map", 1.0, CONTEXT),
     "mesh_msgs/MeshVertexCostsStamped": maps.mesh_costs(MESH, "mbf", "layer", "map", 1.0, CONTEXT),
+    "mesh_msgs/VectorFieldStamped": maps.vector_field(
+        FieldView(np.eye(3), np.ones((3, 3), np.float32)), "map", 1.0, CONTEXT
+    ),
     "visualization_msgs/MarkerArray": maps.mesh_markers(MESH, "map", 1.0, CONTEXT),
     "visualization_msgs/Marker": maps.field_markers(
         FieldView(np.zeros((2, 3)), np.ones((2, 3), np.float32)), "map", 0.0, CONTEXT

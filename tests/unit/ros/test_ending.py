@@ -1,6 +1,34 @@
-"""What a command that runs shows of the robot it waits for."""
+"""How a command that runs ends, and what it shows of the robot it waits for."""
 
-from mbf_ros.ending import shown_state
+import os
+import signal
+
+import pytest
+import typer
+
+from mbf_ros.ending import Parent, shown_state, wait_for_ctrl_c
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows does not say when a parent is gone")
+@pytest.mark.parametrize("ignored", [False, True])
+def test_a_command_ends_with_its_parent_unless_it_is_to_outlive_it(monkeypatch, capsys, ignored):
+    parent, looks = Parent(), []
+    parent.end_without()
+    monkeypatch.setattr(os, "getppid", lambda: 1)
+    monkeypatch.setattr(signal, "getsignal", lambda number: signal.SIG_IGN if ignored else signal.SIG_DFL)
+
+    def look():
+        looks.append(None)
+        if len(looks) == 3:
+            signal.raise_signal(signal.SIGINT)
+
+    if ignored:
+        wait_for_ctrl_c(parent, look, 0.0)
+        assert len(looks) == 3
+        return
+    with pytest.raises(typer.Exit):
+        wait_for_ctrl_c(parent, look, 0.0)
+    assert len(looks) == 1 and "nohup" in capsys.readouterr().err
 
 
 def test_another_topic_or_frame_is_shown_and_the_same_one_only_once():

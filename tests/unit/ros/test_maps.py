@@ -76,6 +76,10 @@ def test_an_update_of_the_changed_window_makes_one_grid_of_the_other(before, aft
             "visualization_msgs/MarkerArray",
             maps.field_markers(FieldView(np.zeros((2, 3)), np.ones((2, 3))), "map", 0.0, CONTEXT),
         ),
+        (
+            "mesh_msgs/VectorFieldStamped",
+            maps.vector_field(FieldView(np.zeros((2, 3)), np.ones((2, 3))), "map", 0.0, CONTEXT),
+        ),
     ],
 )
 def test_a_message_of_a_map_has_exactly_the_fields_of_its_type(kind, message):
@@ -91,6 +95,13 @@ def test_a_triangle_has_the_colours_of_its_corners_from_free_to_forbidden():
     assert free == maps.FREE_COLOR and forbidden == maps.FORBIDDEN_COLOR
     assert middle == pytest.approx(tuple((a + b) / 2 for a, b in zip(free, forbidden, strict=True)))
     assert [(p["x"], p["y"]) for p in marker["points"]] == [(0, 0), (1, 0), (0, 1)]
+
+
+def test_directions_begin_where_they_hold():
+    view = FieldView(np.array([[1.0, 2.0, 0.0], [3.0, 4.0, 5.0]]), np.float32([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]))
+    field = maps.vector_field(view, "map", 0.0, CONTEXT)["vector_field"]
+    assert list(field["positions"]) == [{"x": 1.0, "y": 2.0, "z": 0.0}, {"x": 3.0, "y": 4.0, "z": 5.0}]
+    assert list(field["vectors"]) == [{"x": 0.0, "y": 1.0, "z": 0.0}, {"x": 1.0, "y": 0.0, "z": 0.0}]
 
 
 def test_directions_are_lines_of_equal_length():

@@ -22,7 +22,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Empty
 from tf2_msgs.msg import TFMessage
 
-PERIOD, COMMAND_TIMEOUT = 0.04, 1.0
+PERIOD, COMMAND_TIMEOUT = 0.1, 1.0  # s; oftener, a node on a busy machine would hear it seconds late
 
 
 class Robot(Node):
