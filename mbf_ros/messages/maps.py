@@ -142,7 +142,7 @@ def vector_field(view: FieldView, frame_id: str, stamp: float, context: MessageC
     """Return the directions of a plan as a mesh_msgs/VectorFieldStamped: unit vectors where they begin."""
     return {
         "header": context.header(frame_id, stamp),
-        "vector_field": {"positions": points(view.points), "vectors": points(view.directions)},
+        "vector_field": {"positions": points(view.points), "vectors": points(view.directions.astype(np.float64))},
     }
 
 
