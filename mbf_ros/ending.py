@@ -27,7 +27,7 @@ class Parent:
         self._process = os.getppid()
 
     def end_without(self) -> None:
-        """Raise typer.Exit where it is gone; what is open stops the robot on the way out."""
+        """Raise typer.Exit where it is gone; what is open is closed, and stops the robot."""
         if os.getppid() == self._process or signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
             return
         with suppress(OSError):  # whoever read what is printed may be gone, too
