@@ -94,6 +94,9 @@ class FollowPath(MapPlugin, AbstractController):
             return ControlResult(ExePathOutcome.MISSED_PATH, text)
         try:
             there = self.on_map(pose)
+            if self.navigation_map.point_check()(there).state is CellState.OUTSIDE:
+                text = f"the robot ({there.x:.2f}, {there.y:.2f}) is outside the map"
+                return ControlResult(ExePathOutcome.OUT_OF_MAP, text)
             command, obstacle = self._room_to_turn.choose(
                 pose,
                 tracker.progress,

@@ -8,6 +8,7 @@ from dataclasses import replace
 from mbf_abstract.geometry import Path
 from mbf_abstract.goals.goal_area import DiscArea
 from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseFeedback, MoveBaseGoal
+from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
 from mbf_abstract.testing.conformance.rig import START, Box, T_map_dock
 from mbf_abstract.testing.conformance.site import Site, situation, somewhere
@@ -127,6 +128,19 @@ def a_path_far_from_the_robot_is_missed(site: Site) -> None:
     result = site.navigator.exe_path(site.path((8.0, 6.0), (10.0, 6.0)))
     site.expect_outcome(result, ExePathOutcome.MISSED_PATH, "6.32 m")
     site.expect_near(START.x, START.y, 0.05, "the path is elsewhere")
+
+
+@situation(controller_max_retries=0)
+def a_robot_that_left_the_map_stands(site: Site) -> None:
+    """A robot outside the map that it drives on ends its path with OUT_OF_MAP; a window around it has no outside."""
+    site.rig.robot.T_map_odom = replace(site.rig.robot.T_map_odom, translation=(-4.0, 0.0, 0.0))
+    site.rig.clock.sleep(0.6)
+    here = site.server.runtime.robot.pose()
+    outside = site.map.point_check()(here).state is CellState.OUTSIDE
+    result = site.navigator.exe_path(site.path((here.x, here.y), (0.0, 4.0)))
+    site.expect_outcome(result, ExePathOutcome.OUT_OF_MAP if outside else ExePathOutcome.SUCCESS)
+    if outside:
+        site.expect_stands(0.5, "the robot left the map")
 
 
 @situation()
