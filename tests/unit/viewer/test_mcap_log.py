@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from foxglove_schemas_protobuf.TriangleListPrimitive_pb2 import TriangleListPrimitive
 from mcap.decoder import DecoderFactory
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory as ProtobufDecoderFactory
@@ -21,7 +22,7 @@ from terrain.recording.recorder import MAP_PERIOD, Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.session.session import Session
-from terrain.viewer.logs.foxglove_messages import MAP_LIFT, nanoseconds
+from terrain.viewer.logs.foxglove_messages import MAP_LIFT, nanoseconds, triangles
 from terrain.viewer.logs.mcap_log import write_mcap
 from terrain.viewer.logs.run_messages import ActionStates
 from terrain.viewer.pictures.colours import WALL
@@ -174,6 +175,23 @@ def test_a_mesh_map_is_drawn_in_the_colours_of_its_costs_and_what_changes_is_dra
     assert 0 < len(over.indices) < 0.01 * len(surface.indices)
     assert max(np.hypot(p.x - 20.0, p.y - 15.0) for p in over.points) < 2.0
     assert [(d.id, d.type) for d in gone.deletions] == [("changed costs", 0)] and heap.entities[0].id == "changed costs"
+
+
+def test_a_mesh_is_the_message_that_is_put_together_point_by_point():
+    rng = np.random.default_rng(3)
+    vertices = np.concatenate([np.round(rng.normal(0.0, 50.0, (40, 3)), 8), [[0.0, -0.0, 1e-9], [-1e-9, 1e5, 0.0]]])
+    colours = np.concatenate([rng.integers(0, 256, (40, 3)), [[0, 0, 0], [255, 0, 1]]]).astype(np.uint8)
+    faces = rng.integers(0, 42, (30, 3)).astype(np.int32)
+    expected = TriangleListPrimitive(indices=faces.ravel().tolist())
+    expected.pose.orientation.w = 1.0
+    for (x, y, z), (r, g, b) in zip(np.round(vertices, 6).tolist(), (colours / 255.0).round(3).tolist(), strict=True):
+        expected.points.add(x=x, y=y, z=z)
+        expected.colors.add(r=r, g=g, b=b, a=1.0)
+
+    made = triangles(vertices, faces, colours)
+
+    assert made.SerializeToString(deterministic=True) == expected.SerializeToString(deterministic=True)
+    assert len(triangles(vertices[:0], faces[:0], colours[:0]).points) == 0
 
 
 def test_a_run_on_a_mesh_keeps_the_costs_it_was_planned_on(meadow):
