@@ -129,6 +129,14 @@ class TiledNavigationMap(TileQuestions):
         self.fit_layers(parameters.inscribed_radius)
         self._radius, self.footprint = parameters.inscribed_radius, parameters.footprint
 
+    def configuration_warnings(self) -> list[str]:
+        """One for a robot larger than the one that the layers of the tiles were computed for."""
+        built, radius = self.tiled.index.inscribed_radius, self.inscribed_radius
+        if not 0.0 < built < radius:
+            return []
+        text = f"the tiles were built for a robot of the radius {built:g} m, this one has {radius:g} m: beside their"
+        return [f"{text} obstacles, ground that its body touches may count as free; build them for this robot"]
+
     def moment(self) -> Moment:
         """The map as it is now."""
         return Moment(self._squares, None if self._window is None else self._window.now, self._for_robot)
