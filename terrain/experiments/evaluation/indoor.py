@@ -70,7 +70,7 @@ def room(level: int, seed: int) -> Scenario:
     middle, far = 0.5 * WIDTH, LENGTH + BEFORE
     return Scenario(
         name=f"level {level}",
-        proves="A robot finds a path among posts that are on no map.",
+        proves="A robot finds its way among posts that are on no map.",
         backend="costmap",
         navigation=CONFIGS,
         world=GeneratedWorld(type="generated", size=floor_size(), spacing=0.1),
