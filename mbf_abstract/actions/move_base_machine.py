@@ -72,6 +72,7 @@ class MoveBaseMachine:
             return end
         finally:  # e.g. a replanning that still runs when the robot arrives
             self._goals.cancel("move_base is over")
+            self._recoveries.finish()
 
     def _react(self, message: AnyGoalHandle | None) -> End | None:
         handle = self._job.handle

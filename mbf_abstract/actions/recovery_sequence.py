@@ -35,6 +35,10 @@ class RecoverySequence:
         self._start_list_again()
         self._monitor.restart(self._runtime.parameters.escalation_behaviors)
 
+    def finish(self) -> None:
+        """The goal is over."""
+        self._monitor.finish()
+
     def note_failure(self, trigger: Trigger, outcome: int) -> None:
         """Remember what failed, and where."""
         self._trigger = trigger

@@ -13,6 +13,10 @@ When to use: one monitor for each goal of an executive of your own; ``move_base`
 have one. When not: a robot that moves without getting anywhere raises no failure; the oscillation and progress watches
 of ``exe_path`` make one of it.
 
+A place at which the ground is steeper than planned, or the wheels find no hold, is closed on the maps as soon as a
+recovery has led the robot away from it, so that the next plan leads around (``maps.avoided_places``). So is a place at
+which the robot is stuck because it got nowhere. An executive whose goal is over calls ``finish``.
+
 Places are kept until the goal ends, so a robot that is sent to and fro between two closed doors is found, too. What
 counts is where a failure was met, not what the robot did in between; a plan that succeeds is no progress.
 """
@@ -20,6 +24,7 @@ counts is where a failure was met, not what the robot did in between; a plan tha
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from mbf_abstract.actions.meetings import behavior_for_meetings, meeting_distance
@@ -27,6 +32,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.avoided_places import AvoidedPlace, AvoidedPlaces
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, is_success, outcome_name
 from mbf_abstract.server.plugin_table import PluginTable
 from mbf_abstract.traffic.right_of_way import MEETING_LENGTH
@@ -50,6 +56,10 @@ BLOCKED = frozenset(
     ]
 )
 """Failures that another robot in the way causes."""
+NO_PLAN = frozenset([GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_START, GetPathOutcome.BLOCKED_GOAL])
+"""Failures that closed places may be to blame for."""
+NOWHERE = frozenset([ExePathOutcome.OSCILLATION, MoveBaseOutcome.OSCILLATION])
+"""Failures of a robot that drives and gets nowhere."""
 
 
 @dataclass
@@ -90,6 +100,7 @@ class StuckMonitor:
 
     def __init__(self, runtime: Runtime, plugins: PluginTable) -> None:
         self._runtime, self._plugins = runtime, plugins
+        self._avoided = AvoidedPlaces(runtime.map_hooks.avoid)
         self.restart()
 
     def restart(self, escalation: Sequence[str] = ()) -> None:
@@ -104,6 +115,11 @@ class StuckMonitor:
         self._spots: list[TroubleSpot] = []
         self._present: TroubleSpot | None = None
         self._for_meeting = ""  # the behaviour that is due because the robot meets others
+        self._avoided.forget()
+
+    def finish(self) -> None:
+        """Open all places that were closed; the goal is over."""
+        self._avoided.forget()
 
     # ------------------------------------------------------------------------------------------- what happened
     def note_failure(self, outcome: int) -> None:
@@ -119,7 +135,9 @@ class StuckMonitor:
         spot.failures[outcome].append(self._runtime.clock.now())
         if outcome in BLOCKED and spot.meetings < MOST_MEETINGS and self._meets_others():
             self._for_meeting = behavior_for_meetings(self._runtime, self._plugins)
-        if self._is_too_much(spot.failures[outcome]) and not was_stuck:
+        is_stuck = self._is_too_much(spot.failures[outcome])
+        self._avoid_or_open(pose, outcome, is_stuck)
+        if is_stuck and not was_stuck:
             self._runtime.events.emit(
                 EventKind.STUCK,
                 "stuck_monitor",
@@ -129,6 +147,13 @@ class StuckMonitor:
                 tried=list(spot.tried),
                 message=str(spot),
             )
+
+    def _avoid_or_open(self, pose: Pose, outcome: int, is_stuck: bool) -> None:
+        """Note a place that is worse than the map says; open all again where no plan is left."""
+        if outcome == ExePathOutcome.ROBOT_STUCK or (is_stuck and outcome in NOWHERE):
+            self._avoided.note(pose, self._runtime.parameters.stuck_distance)
+        elif outcome in NO_PLAN and self._avoided.open_all():
+            self._report_avoided(())
 
     def _meets_others(self) -> bool:
         """Whether the robot meets robots that announce their paths."""
@@ -151,9 +176,20 @@ class StuckMonitor:
         return self._spots[-1]
 
     def note_recovery(self, behavior: str, outcome: int) -> None:
-        """Note that a behaviour has run against the last failure, and how it ended."""
+        """Note that a behaviour has run against the last failure, and its end; close the places it led away from."""
         if self._present is not None:
             self._present.tried[behavior] = outcome
+        with suppress(RobotStateError):
+            before = self._avoided.closed
+            now = self._avoided.close_those_left(self._runtime.robot.pose())
+            if now != before:
+                self._report_avoided(now)
+
+    def _report_avoided(self, places: Sequence[AvoidedPlace]) -> None:
+        """Put into the log which places plans avoid from now on."""
+        centres = [list(place.centre.position) for place in places]
+        text = f"plans avoid {len(centres)} place(s) at which the robot was stuck" if centres else "no place is avoided"
+        self._runtime.events.emit(EventKind.CUSTOM, "stuck_monitor", message=text, places=centres)
 
     # --------------------------------------------------------------------------------------------- what is due
     @property

@@ -16,6 +16,9 @@ LEAST_PROGRESS = 0.1
 NEAR_END = 0.5
 """Length [m] left of the path below which turning to the final heading is progress."""
 
+LEAST_RESPONSE = 0.1
+"""Share of the commanded speeds below which a robot counts as standing."""
+
 
 class MotionWatch:
     """Watches one control loop."""
@@ -52,8 +55,7 @@ class MotionWatch:
                 f"the robot tilts by {math.degrees(tilt):.1f} degrees, allowed are {allowed:.1f}: "
                 "the ground is steeper than planned"
             )
-        commanded = not self._runtime.gate.last_command.is_stopped()
-        if not (commanded and measured is not None and measured.is_stopped()):
+        if measured is None or not _ignores(self._runtime.velocity_or_command(None), measured):
             self._ignored.restart()
         elif 0.0 < parameters.cmd_vel_ignored_tolerance < self._ignored.elapsed:
             return ExePathOutcome.ROBOT_STUCK, f"the robot has ignored its commands for {self._ignored.elapsed:.1f} s"
@@ -68,6 +70,12 @@ class MotionWatch:
             left = f"{tracker.remaining:.2f} m before the path's end"
             return ExePathOutcome.OSCILLATION, f"no progress in {parameters.progress_timeout:g} s, {left}"
         return None
+
+
+def _ignores(command: Twist, measured: Twist) -> bool:
+    """Whether hardly any of a command is carried out: wheels that slip make a robot shiver on the spot."""
+    least = max(LEAST_RESPONSE * command.speed, 1e-3), max(LEAST_RESPONSE * abs(command.wz), 1e-3)
+    return not command.is_stopped() and measured.is_stopped(*least)
 
 
 class OscillationDetector:

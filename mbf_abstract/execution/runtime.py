@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from itertools import count
@@ -16,6 +16,7 @@ from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.callbacks import CallbackThread
+from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_abstract.maps.relaxation import Relaxation
 from mbf_abstract.plugins import ControlResult, PluginKind
 from mbf_abstract.time.clock import Clock
@@ -43,6 +44,9 @@ class MapHooks(Protocol):
 
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
         """What the robot would touch if it kept a command for a time [s], and where; empty = nothing."""
+
+    def avoid(self, places: Sequence[AvoidedPlace]) -> None:
+        """Close these places on all maps, and open those that were closed before."""
 
     def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
         """Keep the map alive while a goal of this kind runs."""

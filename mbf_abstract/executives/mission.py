@@ -129,11 +129,15 @@ class MissionContext:
         return any(goal.paused for goal in self.running_goals())
 
     def end_goals(self, reason: str) -> None:
-        """Cancel all goals of this mission and wait until each of them is final; the robot then stands."""
+        """Cancel all goals of this mission and wait until each of them is final; the robot then stands.
+
+        Places that plans have avoided are open again.
+        """
         for handle in self.running_goals():
             handle.cancel(reason)
         for handle in self.running_goals():
             handle.wait()
+        self.stuck.finish()
 
     # ------------------------------------------------------------------------------------------- path
     def path_to_follow(self) -> Path:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
+from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.contact import SAME_STOREY, RobotBox
@@ -131,6 +132,12 @@ class NavigationMap(ABC):
         """Offset [m] from ``pose`` to the nearest obstacle, along the axes of the map; None if none is ``within`` [m].
 
         Obstacles on other storeys do not count.
+        """
+
+    def avoid(self, places: Sequence[AvoidedPlace]) -> None:  # noqa: B027 - for maps that can close places
+        """Close discs on the ground, and no others: lethal for plans, refiners and controllers from now on.
+
+        They stay closed whatever sensors see or ``clear`` removes, until the next call. A map that cannot ignores it.
         """
 
     def heights_below(self, points: FloatArray) -> FloatArray | None:

@@ -15,6 +15,7 @@ from typing import ClassVar
 
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.view import FieldView, FloorMap, FloorWindow, GridView, MapView, MeshView
@@ -148,6 +149,9 @@ class MapInterface(PluginHost):
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
         """What the robot would touch, and where, if it kept ``command`` for ``duration`` [s]; empty = nothing."""
         return ""
+
+    def avoid(self, places: Sequence[AvoidedPlace]) -> None:
+        """Close these places for plans and controllers, and open those that were closed before; nothing here."""
 
     def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
         """Keep the map alive while a goal of this kind runs."""

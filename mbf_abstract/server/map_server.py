@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -16,6 +17,7 @@ from mbf_abstract.config.configuration import Config
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.scan_intake import ScanIntake
 from mbf_abstract.maps.sensing import RangeScan
@@ -140,6 +142,18 @@ class MapServer(AbstractNavigationServer):
         there = self.runtime.transforms.transform_pose(pose, navigation_map.frame_id)
         reason: str = navigation_map.obstacle_ahead(there, command, duration)
         return reason
+
+    def avoid(self, places: Sequence[AvoidedPlace]) -> None:
+        """Close these places on all maps, and no others; a map whose frame is not known to them stays as it is."""
+        for served in self.served.values():
+            with suppress(TransformError):
+                there = [
+                    replace(place, centre=self.runtime.transforms.transform_pose(place.centre, served.map.frame_id))
+                    for place in places
+                ]
+                served.map.avoid(there)
+                with suppress(Exception):  # a layer that raises makes the map stale, which it says itself
+                    served.update()
 
     @contextmanager
     def using_map(self, kind: PluginKind) -> Iterator[None]:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from mbf_abstract.geometry import Pose
-from mbf_costmap_nav.grid.costmap import LETHAL, CellArray, CellBox, Costmap, GridGeometry
+from mbf_costmap_nav.grid.costmap import INSCRIBED, LETHAL, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.map.layer import shifted
 
 
@@ -51,6 +51,16 @@ class CellWindow:
         self._cells[box.slices] = self._default_cost
         yield self._cells
         self._changed()
+
+    def close_disc(self, centre: tuple[float, float], radius: float, box: CellBox) -> None:
+        """Forbid the robot's centre, not its outline, in the cells of ``box`` whose middles lie in a disc [m]."""
+        grid = self.geometry
+        rows, columns = np.mgrid[box.slices]
+        x = grid.origin_x + (columns + 0.5) * grid.resolution
+        y = grid.origin_y + (rows + 0.5) * grid.resolution
+        inside = (x - centre[0]) ** 2 + (y - centre[1]) ** 2 <= radius**2
+        cells = self._cells[box.slices]
+        cells[inside & (cells < INSCRIBED)] = INSCRIBED
 
     def centre_on(self, pose: Pose) -> tuple[int, int]:
         """Move the window by whole cells so that ``pose`` is in its middle; return by how many along x and y.

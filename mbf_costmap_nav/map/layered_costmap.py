@@ -16,6 +16,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.view import FloorMap, FloorWindow
@@ -82,6 +83,7 @@ class LayeredCostmap(SnapshotAnswers):
         self._footprint_padding = footprint_padding
         self.last_update: float | None = None
         self._after_layers: dict[str, CellArray] | None = None  # cells as each layer has left them; None = not kept
+        self._avoided: tuple[AvoidedPlace, ...] = ()
         self._unmoved: set[str] = set()  # names of layers whose cells are not those of the window, or of their floor
         for layer in layers:
             layer.match_geometry(geometry)
@@ -251,6 +253,14 @@ class LayeredCostmap(SnapshotAnswers):
                 with self.layers.computing(layer):
                     layer.update_costs(cells, box)
                 self._keep_cells(layer.name, cells, box)
+            for place in self._avoided:
+                self._window.close_disc((place.centre.x, place.centre.y), place.radius, box)
+
+    def avoid(self, places: Sequence[AvoidedPlace]) -> None:
+        """Forbid the robot's centre in these discs, and in no others, from the next update on."""
+        with self._lock:
+            self._avoided = tuple(places)
+            self._window.recompute_all()
 
     def _follow(self, robot_pose: Pose) -> None:
         """Move the window so that the robot is in its middle, and the layers with it."""

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_mesh_nav.arrays import IntArray
-from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerParameters, MeshLayer
+from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED, CostArray, LayerParameters, LethalArray, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
 from mbf_mesh_nav.map.snapshot import MeshSnapshot, SnapshotSeries
 from mbf_mesh_nav.map.snapshot_answers import SnapshotAnswers
@@ -77,6 +79,7 @@ class MeshMap(SnapshotAnswers):
         self.internal_to_input = topology.internal_to_input
         self._snapshots = SnapshotSeries(topology)
         self._changes: dict[int, IntArray] = {}  # version -> vertices that differ from the version before
+        self._closed = np.zeros(topology.vertex_count, dtype=np.bool_)  # vertices in places to avoid
         self.set_layers(LayerGraph(), None)
 
     @classmethod
@@ -193,7 +196,7 @@ class MeshMap(SnapshotAnswers):
             lethal = np.zeros(count, np.bool_) if shown is None else shown.lethal
             costs.flags.writeable = lethal.flags.writeable = False  # as those of a layer: kernels know one type
             self._changes.clear()
-            self._snapshot = self._snapshots.begin(costs, lethal, edge_cost_factor)
+            self._snapshot = self._snapshots.begin(costs, self._with_closed(lethal), edge_cost_factor)
 
     def set_edge_cost_factor(self, edge_cost_factor: float) -> None:
         """Change how much costs lengthen edges, at run time.
@@ -261,11 +264,39 @@ class MeshMap(SnapshotAnswers):
         with self._lock:
             self._publish(self.layers.apply(event))
 
+    def avoid(self, places: Sequence[AvoidedPlace]) -> None:
+        """Make the vertices of these discs lethal, and of no others; each disc lies on the storey of its centre."""
+        closed = np.zeros_like(self._closed)
+        for place in places:
+            spot = self.locate_one(place.centre.position, place.radius)
+            if spot is not None:
+                graph = (self.vertices, self.neighbour_offsets, self.neighbours)
+                nearest = int(self.faces[spot.face, np.argmax(spot.barycentric)])
+                closed[vertices_in_disc(*graph, nearest, spot.point, float(place.radius))] = True
+        with self._lock:
+            changed = np.flatnonzero(closed != self._closed).astype(np.int32)
+            self._closed = closed
+            if len(changed):
+                now = self._snapshot if self.default_layer is None else self.layers[self.default_layer]
+                self._show(now.costs, now.lethal, changed)
+
+    def _with_closed(self, lethal: LethalArray) -> LethalArray:
+        """The lethal vertices (V,) of a layer and those that are closed."""
+        if not self._closed.any():
+            return lethal
+        both = lethal | self._closed
+        both.flags.writeable = False  # as those of a layer: kernels know one type
+        return both
+
     def _publish(self, changed: dict[str, IntArray]) -> None:
         """Make the snapshot that follows a change of the default layer; only edges at changed vertices are touched."""
         if self.default_layer not in changed:
             return
         layer, vertices = self.layers[self.default_layer], changed[self.default_layer]
-        self._snapshot = self._snapshots.follow(layer.costs, layer.lethal, vertices)
+        self._show(layer.costs, layer.lethal, vertices)
+
+    def _show(self, costs: CostArray, lethal: LethalArray, vertices: IntArray) -> None:
+        """Make the snapshot that differs from the last one at some vertices only."""
+        self._snapshot = self._snapshots.follow(costs, self._with_closed(lethal), vertices)
         self._changes[self._snapshot.version] = vertices
         self._changes.pop(self._snapshot.version - REMEMBERED_CHANGES, None)

@@ -10,7 +10,7 @@ Cost: one tree query of all nodes an update, about 5 ms for 10,000.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_abstract.maps.disc_map import DiscMap
 from mbf_abstract.maps.graph.graph_layers import InflationLayer, InflationParameters, ObstacleLayer, ObstacleParameters
 from mbf_abstract.maps.layered_map import LayeredMap
@@ -94,6 +96,7 @@ class GraphMap(LayeredMap, DiscMap):
         self.layers = LayerStack([self.obstacles, self.inflation])
         self._ground_lethal = lethal
         self._ground_costs = np.zeros(len(nodes)) if ground_costs is None else ground_costs
+        self._avoided: tuple[AvoidedPlace, ...] = ()
         self._outdated = True
         self.update(None, 0.0)
 
@@ -138,6 +141,11 @@ class GraphMap(LayeredMap, DiscMap):
                 self._compute()
                 self._outdated, self.layers.problem = False, ""
 
+    def avoid(self, places: Sequence[AvoidedPlace]) -> None:
+        """Forbid the robot's centre on the nodes of these discs, and of no others, from the next update on."""
+        with self._lock:
+            self._avoided, self._outdated = tuple(places), True
+
     def _compute(self) -> None:
         """Compute the layers again."""
         lethal = self._ground_lethal.copy()
@@ -147,6 +155,8 @@ class GraphMap(LayeredMap, DiscMap):
         with self.layers.computing(self.inflation):
             clearance = self._clearances(lethal)
             costs = self._ground_costs + self.inflation.costs(clearance, self.robot_radius)
+        for place in self._avoided:
+            clearance[norm(self.nodes - np.asarray(place.centre.position)) <= place.radius] = 0.0
         self.state = GraphState(lethal, clearance, costs)
 
     def _clearances(self, lethal: BoolArray) -> FloatArray:

@@ -1,8 +1,9 @@
 """Back up: straight, or along the track that the robot has driven; the simplest escape from a dead end.
 
 With ``along_track`` it follows the driven track by pure pursuit in reverse, over ground that was free a moment ago;
-where the track ends, is unknown or does not lie behind the robot (it has turned on the spot) it backs up straight. Not
-for a long robot in a narrow place: steering backward swings its front outward. Ends with IMPASSABLE before an obstacle.
+where the track ends, is unknown or does not lie behind the robot (it has turned on the spot) it backs up straight. So
+it does where the robot must not turn, as on a slope, or would touch something by turning. Not for a long robot in a
+narrow place: steering backward swings its front outward. Ends with IMPASSABLE before an obstacle.
 
 When to use: the robot is too close to an obstacle in front to turn. When not: obstacles may have come up behind it that
 no sensor sees.
@@ -58,7 +59,8 @@ class BackUpRecovery(GuardedRecovery):
             if not p.along_track:
                 return Twist.planar(vx=-p.speed)
             _, curvature = arc_to(pose, tracker.point_at(tracker.progress + LOOKAHEAD))
-            return Twist.planar(vx=-p.speed, wz=max(-p.yaw_rate, min(p.yaw_rate, -p.speed * curvature)))
+            along = Twist.planar(vx=-p.speed, wz=max(-p.yaw_rate, min(p.yaw_rate, -p.speed * curvature)))
+            return Twist.planar(vx=-p.speed) if self.obstacle_ahead(pose, along) else along
 
         result = self.drive(request, velocity, finished)
         return RecoveryResult(result.outcome, f"{result.message or 'done'}, backed up {tracker.progress:.2f} m")

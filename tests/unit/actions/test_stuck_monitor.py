@@ -11,6 +11,7 @@ from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcom
 from mbf_abstract.testing.scripted_session import ScriptedSession
 
 BLOCKED, COLLISION = ExePathOutcome.BLOCKED_PATH, ExePathOutcome.COLLISION
+STUCK = ExePathOutcome.ROBOT_STUCK
 LADDER = ("wait", "back_out")
 
 
@@ -168,3 +169,71 @@ def test_it_counts_as_a_naive_counter_does(failures, limit, tenths, wait):
                     stuck.add((place, kind))
             assert answer == any((place, kind) in stuck for kind in (BLOCKED, COLLISION))
         assert len(session.recorded(EventKind.STUCK)) == len(stuck)
+
+
+# ------------------------------------------------------------------------------------------- places to avoid
+@pytest.fixture
+def avoiding(stand):
+    """``avoiding(**parameters)``: a monitor, and ``closed``: what it closes on the map, call by call."""
+
+    def make(**parameters):
+        made = stand(**parameters)
+        closed = []
+        made.session.server.avoid = lambda places: closed.append([round(place.centre.x, 6) for place in places])
+        made.monitor = StuckMonitor(made.session.server.runtime, made.session.server.plugins)
+        return made, closed
+
+    return make
+
+
+def recovered_at(made, x):
+    made.session.robot._x = x
+    made.session.clock.sleep(0.05)
+    made.monitor.note_recovery("back_up", 0)
+
+
+def test_a_place_without_hold_is_closed_once_the_robot_has_left_it(avoiding):
+    made, closed = avoiding(stuck_distance=0.5)
+    made.fail(3.0, STUCK)
+    recovered_at(made, 3.0)
+    assert not closed
+    recovered_at(made, 2.5)
+    assert closed == [[3.25]]
+
+
+def test_a_place_where_others_are_in_the_way_is_not_closed(avoiding):
+    made, closed = avoiding()
+    for _ in range(5):
+        made.fail(3.0, BLOCKED)
+        recovered_at(made, 2.0)
+    assert not closed
+
+
+def test_a_robot_that_gets_nowhere_again_and_again_avoids_the_place(avoiding):
+    made, closed = avoiding()
+    for _ in range(3):
+        assert not closed
+        made.fail(3.0, ExePathOutcome.OSCILLATION)
+        recovered_at(made, 2.0)
+    assert closed == [[3.25]]
+
+
+def test_where_no_plan_is_left_all_places_are_open_for_the_rest_of_the_goal(avoiding):
+    made, closed = avoiding()
+    made.fail(3.0, STUCK)
+    recovered_at(made, 2.0)
+    made.fail(2.0, GetPathOutcome.NO_PATH_FOUND)
+    made.fail(3.0, STUCK)
+    recovered_at(made, 2.0)
+    assert closed == [[3.25], []]
+
+
+def test_a_goal_that_is_over_leaves_no_place_closed(avoiding):
+    made, closed = avoiding()
+    made.fail(3.0, STUCK)
+    recovered_at(made, 2.0)
+    made.monitor.finish()
+    assert closed == [[3.25], []]
+    made.fail(6.0, STUCK)
+    recovered_at(made, 5.0)
+    assert closed[-1] == [6.25]

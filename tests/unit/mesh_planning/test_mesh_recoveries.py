@@ -112,6 +112,17 @@ def test_a_track_that_does_not_lie_behind_is_ignored(run, plain):
     assert result.success and motion.current.x == pytest.approx(2.4, abs=0.05)
 
 
+def test_on_a_slope_too_steep_to_turn_on_a_curved_track_is_backed_up_straight(run):
+    """A tilted robot has to get away; as long as it follows its track in wide curves it does so."""
+    ramp = MeshMap.from_heights(np.tile(0.6 * np.arange(31) * 0.2, (31, 1)), 0.2, 0.2)
+    bend = [(3.0 - 0.1 * step, 3.0 + 0.02 * step**2, 0.6 * (3.0 - 0.1 * step)) for step in range(10, 0, -1)]
+    result, motion = run(
+        BackUpRecovery, ramp, (3.0, 3.0, 1.8), track=bend, distance=0.5, along_track=True, yaw_rate=1.5
+    )
+    assert result.success, result.message
+    assert motion.current.x < 2.65
+
+
 @pytest.mark.parametrize("ground", ["border", "lethal"])
 def test_backing_up_stops_before_a_border_and_before_lethal_ground(run, plain, paint, ground):
     mesh_map = plain()
