@@ -56,7 +56,7 @@ BLOCKED = frozenset(
     ]
 )
 """Failures that another robot in the way causes."""
-NO_PLAN = frozenset([GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_START, GetPathOutcome.BLOCKED_GOAL])
+NO_PLAN = frozenset([GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_GOAL])
 """Failures that closed places may be to blame for."""
 NOWHERE = frozenset([ExePathOutcome.OSCILLATION, MoveBaseOutcome.OSCILLATION])
 """Failures of a robot that drives and gets nowhere."""
@@ -154,6 +154,8 @@ class StuckMonitor:
             self._avoided.note(pose, self._runtime.parameters.stuck_distance)
         elif outcome in NO_PLAN and self._avoided.open_all():
             self._report_avoided(())
+        elif outcome == GetPathOutcome.BLOCKED_START:  # perhaps the robot has slid onto a closed place
+            self._avoid_those_left(pose)
 
     def _meets_others(self) -> bool:
         """Whether the robot meets robots that announce their paths."""
@@ -180,10 +182,14 @@ class StuckMonitor:
         if self._present is not None:
             self._present.tried[behavior] = outcome
         with suppress(RobotStateError):
-            before = self._avoided.closed
-            now = self._avoided.close_those_left(self._runtime.robot.pose())
-            if now != before:
-                self._report_avoided(now)
+            self._avoid_those_left(self._runtime.robot.pose())
+
+    def _avoid_those_left(self, pose: Pose) -> None:
+        """Close the places that a robot at a pose does not stand on, and no others."""
+        before = self._avoided.closed
+        now = self._avoided.close_those_left(pose)
+        if now != before:
+            self._report_avoided(now)
 
     def _report_avoided(self, places: Sequence[AvoidedPlace]) -> None:
         """Put into the log which places plans avoid from now on."""

@@ -17,7 +17,9 @@ pytestmark = pytest.mark.usefixtures("one_core")
 MIRE = Pose.planar(5.0, 4.0)
 PLACE = AvoidedPlace(MIRE, 0.6)
 GOAL = Pose.planar(8.0, 4.0)
-TREE = TreeOptions(check_poses=False, clear="clear", out_of_collision="back_up", second_planner_pause=0.0)
+TREE = TreeOptions(
+    check_poses=False, reuse_path=False, clear="clear", out_of_collision="back_up", second_planner_pause=0.0
+)
 
 
 @pytest.fixture(params=["costmap", "mesh", "elevation_grid", "occupancy_octree"])

@@ -142,9 +142,8 @@ class GraphMap(LayeredMap, DiscMap):
                 self._outdated, self.layers.problem = False, ""
 
     def avoid(self, places: Sequence[AvoidedPlace]) -> None:
-        """Forbid the robot's centre on the nodes of these discs, and of no others, from the next update on."""
-        with self._lock:
-            self._avoided, self._outdated = tuple(places), True
+        """Let no plan lead over the nodes of these discs, nor of others that were given before."""
+        self._avoided = tuple(places)
 
     def _compute(self) -> None:
         """Compute the layers again."""
@@ -155,8 +154,6 @@ class GraphMap(LayeredMap, DiscMap):
         with self.layers.computing(self.inflation):
             clearance = self._clearances(lethal)
             costs = self._ground_costs + self.inflation.costs(clearance, self.robot_radius)
-        for place in self._avoided:
-            clearance[norm(self.nodes - np.asarray(place.centre.position)) <= place.radius] = 0.0
         self.state = GraphState(lethal, clearance, costs)
 
     def _clearances(self, lethal: BoolArray) -> FloatArray:
@@ -195,8 +192,11 @@ class GraphMap(LayeredMap, DiscMap):
         return np.asarray(self.nodes[self.free_nodes()])
 
     def free_nodes(self) -> BoolArray:
-        """Nodes (n,) on which the robot's centre may be."""
-        return np.asarray(self.state.clearance > self.robot_radius)
+        """Nodes (n,) on which the robot's centre may be in a plan."""
+        free = self.state.clearance > self.robot_radius
+        for place in self._avoided:
+            free &= norm(self.nodes - np.asarray(place.centre.position)) > place.radius
+        return np.asarray(free)
 
     def obstacles_near(self, x: float, y: float, within: float) -> FloatArray:
         """Places (n, 2) [m] of all lethal nodes."""

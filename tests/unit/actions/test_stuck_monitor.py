@@ -228,6 +228,15 @@ def test_where_no_plan_is_left_all_places_are_open_for_the_rest_of_the_goal(avoi
     assert closed == [[3.25], []]
 
 
+def test_a_robot_that_slides_onto_a_closed_place_may_plan_from_there(avoiding):
+    made, closed = avoiding(stuck_distance=0.5)
+    made.fail(3.0, STUCK)
+    recovered_at(made, 2.0)
+    made.fail(2.8, GetPathOutcome.BLOCKED_START)
+    recovered_at(made, 2.0)
+    assert closed == [[3.25], [], [3.25]]
+
+
 def test_a_goal_that_is_over_leaves_no_place_closed(avoiding):
     made, closed = avoiding()
     made.fail(3.0, STUCK)
