@@ -1,8 +1,8 @@
 """Which recovery behaviour of ``move_base`` is due: those of its list in turn, or the escalation of a stuck robot.
 
 The list starts again after progress: a plan, where planning had failed; a stretch driven since the last recovery, where
-driving had failed. When to use: one for each run of ``move_base``. When not: behaviour trees choose recoveries by their
-branches and need the ``StuckMonitor`` alone.
+driving had failed; one more place that plans avoid from now on. When to use: one for each run of ``move_base``. When
+not: behaviour trees choose recoveries by their branches and need the ``StuckMonitor`` alone.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ class RecoverySequence:
 
     def note_end(self, behavior: str, outcome: int) -> None:
         """Remember how a behaviour ended, and where the robot is after it."""
-        self._monitor.note_recovery(behavior, outcome)
+        if self._monitor.note_recovery(behavior, outcome):
+            self._start_list_again()
         try:
             self._recovered_at = self._runtime.robot.pose()
         except RobotStateError:  # the next plan reports the missing pose with its own text

@@ -177,12 +177,20 @@ class StuckMonitor:
         self._spots.append(TroubleSpot(pose))
         return self._spots[-1]
 
-    def note_recovery(self, behavior: str, outcome: int) -> None:
-        """Note that a behaviour has run against the last failure, and its end; close the places it led away from."""
+    def note_recovery(self, behavior: str, outcome: int) -> bool:
+        """Note that a behaviour has run against the last failure, and its end; close the places it led away from.
+
+        Returns
+        -------
+        bool
+            Whether plans avoid more places than before.
+        """
         if self._present is not None:
             self._present.tried[behavior] = outcome
+        before = len(self._avoided.closed)
         with suppress(RobotStateError):
             self._avoid_those_left(self._runtime.robot.pose())
+        return len(self._avoided.closed) > before
 
     def _avoid_those_left(self, pose: Pose) -> None:
         """Close the places that a robot at a pose does not stand on, and no others."""

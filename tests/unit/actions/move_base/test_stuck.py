@@ -124,3 +124,19 @@ def test_a_name_that_is_no_recovery_behaviour_refuses_the_goal(make_session, nam
     handle = session.send()
     assert handle.status is GoalStatus.REJECTED
     assert name in handle.wait().message
+
+
+def test_the_list_starts_again_with_each_place_that_plans_avoid_from_now_on(make_session):
+    """A robot that finds no hold backs up and plans around the place; where it finds none again, it may do so again."""
+    stuck = ControlResult(ExePathOutcome.ROBOT_STUCK, "no hold")
+    session = make_session(retries=0, oscillation_distance=5.0)
+
+    def one_metre_back(request):
+        session.robot._x -= 1.0
+        session.clock.sleep(0.1)
+        return RecoveryResult(RecoveryOutcome.SUCCESS)
+
+    session.plugin("first", ScriptedRecovery).play(*[one_metre_back] * 5)
+    session.controller.play(stuck, stuck, stuck, session.controller.follow)
+    assert session.send(recovery_behaviors=("first",)).wait().success
+    assert session.recoveries == ["first"] * 3
