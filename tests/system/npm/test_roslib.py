@@ -11,6 +11,7 @@ from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
 
+pytestmark = pytest.mark.timeout(600, func_only=True)  # the packages may have to be installed first
 SUCCEEDED, PREEMPTED, REJECTED = 3, 2, 5  # of actionlib
 CANCELED = "GoalError: Action was canceled"  # roslib's text
 

@@ -14,6 +14,7 @@ from mbf_abstract.time.clock import WallClock, unix_seconds
 from terrain.viewer.foxglove.protocol import SUBPROTOCOLS
 from terrain.viewer.logs.run_messages import TOPICS
 
+pytestmark = pytest.mark.timeout(600, func_only=True)  # the packages may have to be installed first
 SIZE = "width: 8.0, height: 6.0, layers: [{name: area, type: keepout}], area: {zones: []}"
 CONFIG = f"""
 backend: costmap
