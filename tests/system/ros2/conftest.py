@@ -195,8 +195,9 @@ class Trio:
         self._client = getattr(module, "CLIENT", "client.py")
         self._options = getattr(module, "OPTIONS", ())
         simulated = getattr(module, "SIMULATED", False)
-        self._robot_arguments = ["simulated"] if simulated else []
-        self._node_arguments = ["--", "-p", "use_sim_time:=true"] if simulated else []
+        self._robot_arguments = ["simulated", "--ros-args", "-r", "odom:=wheel/odom"] if simulated else []
+        given = ["--", "-p", "use_sim_time:=true", "-p", "odom_topic:=wheel/odom"]
+        self._node_arguments = given if simulated else []
         self.file = logs / "robot.yaml"
         self.file.write_text(getattr(module, "CONFIG", ROBOT))
         self.start_robot()
@@ -258,8 +259,8 @@ def pytest_generate_tests(metafunc):
 def module_trio(ros_folder, tmp_path_factory, request):
     """One trio for all tests of a module, on Kilted where it has no ``PAIRS``.
 
-    On simulated time where the module has ``SIMULATED``; with the script of its ``CLIENT``, its ``CONFIG`` and its
-    ``OPTIONS`` of the command, where it has them.
+    On simulated time, with odometry on another topic, where the module has ``SIMULATED``; with the script of its
+    ``CLIENT``, its ``CONFIG`` and its ``OPTIONS`` of the command, where it has them.
     """
     names = getattr(request, "param", ("kilted", "kilted"))
     folders = [request.getfixturevalue("jazzy_folder") if name == "jazzy" else ros_folder for name in names]

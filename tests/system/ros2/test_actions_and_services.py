@@ -179,11 +179,12 @@ def test_a_paused_goal_stands_until_it_is_resumed(trio):
 
 def test_parameters_are_read_and_set_at_run_time(trio):
     read = lambda *names: trio.client.wait(trio.client.do(order="get", names=names), "values")["values"]  # noqa: E731
-    assert read("planners", "controllers", "shortest.type", "global_frame") == [
+    assert read("planners", "controllers", "shortest.type", "global_frame", "odom_topic") == [
         ["shortest"],
         ["follow"],
         "straight_line",
         "map",
+        "odom",
     ]
     assert trio.client.put("controller_patience", 4.0)["successful"]
     assert read("controller_patience") == [4.0]
