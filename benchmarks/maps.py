@@ -24,6 +24,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,7 +33,8 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
-from mbf_mesh_nav.building.decimation import decimated_to
+from mbf_mesh_nav.building.decimation import carried_errors, decimated_to
+from mbf_mesh_nav.building.height_errors import root_mean_square
 from mbf_mesh_nav.building.map_build import write_map
 from mbf_mesh_nav.building.map_facts import map_facts
 from mbf_mesh_nav.building.surface import BuiltSurface, build_surface
@@ -66,11 +68,11 @@ Row = dict[str, Any]
 
 
 class BuiltMap(NamedTuple):
-    """A mesh, and the standard error of its heights [m]."""
+    """A mesh, and the standard errors of the heights of its vertices [m]."""
 
     vertices: FloatArray
     faces: IntArray
-    height_error: float
+    height_errors: FloatArray
 
 
 def scan_ground(ground: Heightfield, rng: np.random.Generator, grass_share: float) -> FloatArray:
@@ -134,14 +136,10 @@ def misplaced(points: FloatArray, rng: np.random.Generator) -> FloatArray:
 
 def coarser(built: BuiltMap, rng: np.random.Generator) -> BuiltMap:
     """A quarter of the vertices, with wrong heights; the error is what the vertices of the built map show."""
-    vertices, faces, error = built
-    mesh = decimated_to(vertices, faces, COARSE_SHARE)
+    mesh = decimated_to(built.vertices, built.faces, COARSE_SHARE)
     points = mesh.vertices + [0.0, 0.0, 1.0] * rng.uniform(-COARSE_HEIGHTS, COARSE_HEIGHTS, (len(mesh.vertices), 1))
-    locator = MeshMap.from_arrays(points, mesh.faces).locator
-    above = vertices + np.array([0.0, 0.0, 5.0])
-    face, length = locator.cast_rays(above, np.tile([0.0, 0.0, -1.0], (len(vertices), 1)))
-    distances = length[face >= 0] - 5.0
-    return BuiltMap(points, mesh.faces, float(np.hypot(error, np.sqrt(np.mean(distances * distances)))))
+    errors = carried_errors(replace(mesh, vertices=points), built.vertices, built.height_errors)
+    return BuiltMap(points, mesh.faces, errors)
 
 
 def terrain_row(level: int, seed: int, folder: Path, kinds: Sequence[str] = KINDS[:2]) -> tuple[Scenario, Row]:
@@ -159,11 +157,11 @@ def terrain_row(level: int, seed: int, folder: Path, kinds: Sequence[str] = KIND
     truth = heightfield_mesh(ground.heights, ground.dx, ground.dy, ground.x0, ground.y0)
     centres = truth[0][truth[1]].mean(axis=1)[:, :2]
     near = np.linalg.norm(centres[:, None] - places[None], axis=2).min(axis=1) < 0.3
-    built = built_map(points, surface)
-    meshes = {"true": BuiltMap(truth[0], truth[1][~near], 0.0), "built": built}
+    built = built_map(surface)
+    meshes = {"true": BuiltMap(truth[0], truth[1][~near], np.zeros(len(truth[0]))), "built": built}
     if "posed" in kinds:
         scans = misplaced(points, rng)
-        meshes["posed"] = built_map(scans, build_surface(scans))
+        meshes["posed"] = built_map(build_surface(scans))
     if "coarse" in kinds:
         meshes["coarse"] = coarser(built, rng)
     maps = write_maps(folder, f"level_{level}_{seed}", {kind: meshes[kind] for kind in kinds})
@@ -214,15 +212,15 @@ def building_row(number: int, folder: Path) -> tuple[Scenario, Row]:
     levels = scenario.world.levels()  # type: ignore[union-attr]
     rng = np.random.default_rng([seed, CLOUD_STREAM])
     points = np.vstack([scan_surface(levels.ground, rng), scan_surface(levels.walls, rng)])
-    built = built_map(points, build_surface(points))
+    built = built_map(build_surface(points))
     maps = write_maps(folder, f"{scenario.name}_{number}", {"built": built})
     # The world writes the true map itself, so no setting names a file.
     return scenario, {"world": scenario.name, "seed": seed, "maps": {"true": "", **maps}, "route": True}
 
 
-def built_map(points: FloatArray, surface: BuiltSurface) -> BuiltMap:
-    """The map of a surface, with the error that ``mbf map build`` writes."""
-    return BuiltMap(surface.vertices, surface.faces, map_facts(PointCloud(points), surface).height_error)
+def built_map(surface: BuiltSurface) -> BuiltMap:
+    """The map of a surface, with the errors that ``mbf map build`` writes."""
+    return BuiltMap(surface.vertices, surface.faces, surface.height_errors)
 
 
 def write_maps(folder: Path, name: str, maps: Mapping[str, BuiltMap]) -> dict[str, str]:
@@ -230,8 +228,8 @@ def write_maps(folder: Path, name: str, maps: Mapping[str, BuiltMap]) -> dict[st
     files = {}
     for kind, built in maps.items():
         files[kind] = str(folder / f"{name}_{kind}.ply")
-        header = MapHeader((0.0, 0.0, 0.0), 0.0, 0.0, built.height_error)
-        write_map(Path(files[kind]), built.vertices, built.faces, header)
+        header = MapHeader((0.0, 0.0, 0.0), 0.0, 0.0, root_mean_square(built.height_errors))
+        write_map(Path(files[kind]), built.vertices, built.faces, header, built.height_errors)
     return files
 
 

@@ -14,6 +14,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
+from mbf_mesh_nav.building.height_errors import root_mean_square
 from mbf_mesh_nav.kernels.mesh.topology import unit_face_normals
 from mbf_mesh_nav.mesh.locate import SurfaceLocator
 from mbf_mesh_nav.mesh.mesh_report import MeshError
@@ -83,6 +84,25 @@ def decimated_to(vertices: FloatArray, faces: IntArray, share: float) -> Decimat
     if coarse is None:
         raise MeshError("mesh", [f"{share:.1%} of its {len(faces)} faces do not form a sound mesh"])
     return coarse
+
+
+def carried_errors(mesh: DecimatedMesh, vertices: FloatArray, errors: FloatArray) -> FloatArray:
+    """Standard errors (V,) [m] of a decimated mesh, of the heights of the vertices (n, 3) of the whole one (n,).
+
+    A vertex has the mean square of what lies on the faces around it, by the weights of the places there: the error of
+    the whole surface, and its distance from the faces.
+    """
+    if mesh.error_max == 0.0:
+        return errors
+    topology = build_topology(checked_mesh(mesh.vertices, mesh.faces, ALLOWED)[0])
+    found = SurfaceLocator(topology).locate(vertices)
+    corners = topology.internal_to_input[topology.faces[found.faces]].ravel()
+    squares = errors * errors + found.distances * found.distances
+    count, weights = len(mesh.vertices), found.barycentric
+    sums = np.bincount(corners, (weights * squares[:, None]).ravel(), count)
+    totals = np.bincount(corners, weights.ravel(), count)
+    usual = root_mean_square(errors) ** 2 + mesh.error_rms * mesh.error_rms  # of a corner that no place is near to
+    return np.asarray(np.sqrt(np.where(totals > 0.0, sums / np.maximum(totals, 1e-300), usual)))
 
 
 def require_simplification() -> None:

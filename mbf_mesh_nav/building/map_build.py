@@ -16,10 +16,11 @@ import numpy as np
 from mbf_abstract.whole_files import replacing
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.building.clouds.point_cloud import MAX_POINTS, PointCloud, read_clouds
-from mbf_mesh_nav.building.decimation import DecimatedMesh, decimated, require_simplification
+from mbf_mesh_nav.building.decimation import DecimatedMesh, carried_errors, decimated, require_simplification
 from mbf_mesh_nav.building.map_facts import MapFacts, map_facts
 from mbf_mesh_nav.building.surface import BuiltSurface, SurfaceParameters, build_surface
 from mbf_mesh_nav.files.map_header import MapHeader, header_comments
+from mbf_mesh_nav.files.vertex_errors import COORDINATES, FORMAT, HEIGHT_ERROR, vertex_records
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 FACE = np.dtype([("count", "u1"), ("corners", "<i4", (3,))])
@@ -77,38 +78,49 @@ def build_map(
         surface = build_surface(cloud.points, parameters, on_step)
     except MeshError as error:
         raise MeshError(", ".join(map(str, files)), error.reasons, error.hint) from error
-    facts, mesh = map_facts(cloud, surface), DecimatedMesh(surface.vertices, surface.faces)
+    facts, errors = map_facts(cloud, surface), surface.height_errors
+    mesh = DecimatedMesh(surface.vertices, surface.faces)
     if parameters is not None and is_decimated:
         on_step("decimation")
         mesh = decimated(surface.vertices, surface.faces, parameters.decimation_bound)
-        facts = facts.of_decimated(mesh)
+        errors = carried_errors(mesh, surface.vertices, errors)
+        facts = facts.of_decimated(mesh, errors)
     on_step(f"writing {out.name}")
     write_map(
         out,
         mesh.vertices,
         mesh.faces,
         MapHeader(cloud.origin, facts.error_rms, facts.error_95, facts.height_error, facts.crs),
+        errors,
     )
     return facts, surface, cloud
 
 
-def write_map(out: Path, vertices: FloatArray, faces: IntArray, header: MapHeader) -> None:
+def write_map(
+    out: Path, vertices: FloatArray, faces: IntArray, header: MapHeader, errors: FloatArray | None = None
+) -> None:
     """Write a mesh as a binary PLY of eight-byte coordinates; a file of that name is replaced when it is complete.
+
+    Parameters
+    ----------
+    vertices, faces : (V, 3) float64 [m], (F, 3) int32
+    errors : (V,) float64, optional
+        Standard errors of the heights [m]; None = the header's holds for all.
 
     Raises
     ------
     MeshError
         It cannot be written.
     """
-    lines = ["ply", "format binary_little_endian 1.0", *header_comments(header)]
-    lines += [f"element vertex {len(vertices)}", *(f"property double {axis}" for axis in "xyz")]
+    lines = ["ply", FORMAT, *header_comments(header), f"element vertex {len(vertices)}"]
+    lines += COORDINATES if errors is None else [*COORDINATES, HEIGHT_ERROR]
     lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
     records = np.empty(len(faces), dtype=FACE)
     records["count"], records["corners"] = 3, faces
     try:
         with replacing(out) as unfinished, unfinished.open("wb") as file:
             file.write("\n".join(lines).encode("ascii"))
-            file.write(np.ascontiguousarray(vertices, dtype="<f8").tobytes())
+            file.write(vertex_records(vertices, errors))
             file.write(records.tobytes())
     except OSError as error:
         raise MeshError(str(out), [f"cannot be written: {error}"]) from error

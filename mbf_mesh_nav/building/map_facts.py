@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
 from mbf_mesh_nav.building.decimation import DecimatedMesh
+from mbf_mesh_nav.building.height_errors import root_mean_square
 from mbf_mesh_nav.building.surface import BuiltSurface
 
 
@@ -41,7 +40,8 @@ class MapFacts:
     error_rms, error_95, error_max : float
         Of the surface against its points, the noise of the points included; 95 % are closer than ``error_95``.
     height_error : float
-        Standard error of a vertex among its neighbours, see ``error_of_heights``; with what decimation adds.
+        Root mean square of the standard errors of the vertices, see ``building.height_errors``, with what decimation
+        adds.
     faces_before : int
         Before decimation.
     decimation_max : float
@@ -71,13 +71,13 @@ class MapFacts:
     faces_before: int
     decimation_max: float = 0.0
 
-    def of_decimated(self, mesh: DecimatedMesh) -> MapFacts:
-        """Facts of the map with a decimated mesh."""
+    def of_decimated(self, mesh: DecimatedMesh, errors: FloatArray) -> MapFacts:
+        """Facts of the map with a decimated mesh, whose vertices have these standard errors (V,) [m]."""
         return replace(
             self,
             vertices=len(mesh.vertices),
             faces=len(mesh.faces),
-            height_error=math.hypot(self.height_error, mesh.error_rms),
+            height_error=root_mean_square(errors),
             decimation_max=mesh.error_max,
         )
 
@@ -113,35 +113,9 @@ def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
         error_rms=rms,
         error_95=float(np.percentile(distances, 95.0)) if len(distances) else 0.0,
         error_max=float(distances.max(initial=0.0)),
-        height_error=error_of_heights(distances, counts, surface.kept_error),
+        height_error=root_mean_square(surface.height_errors),
         faces_before=len(surface.faces),
     )
-
-
-def error_of_heights(distances: FloatArray, counts: NDArray[np.int64], kept_error: float) -> float:
-    """Standard error [m] of a vertex, whose height is the mean of the points of a cell.
-
-    The points are nearer to faces that were made of them than to the ground: each cell takes one of their degrees of
-    freedom, less if it was smoothed. A cell's variance is that of a point over their number, on average over the cells,
-    many of which have fewer points than usual; where heights are smoothed, those lean on their neighbours. Errors that
-    all points of a place have in common, as of scans from a drifting pose, lift it as a whole; they are not in it.
-
-    Parameters
-    ----------
-    distances : (n,) float64
-        Of the points from the faces [m].
-    counts : (c,) int64
-        Points of each cell.
-    kept_error : float
-        Share of a cell's error that smoothing lets through.
-    """
-    if not len(distances) or not len(counts):
-        return 0.0
-    free = max(len(distances) - kept_error * len(counts), 1.0)
-    variance = float((distances * distances).sum()) / free
-    several = np.maximum(counts, 1)
-    of_cell = float((1.0 / several).mean()) if kept_error == 1.0 else 1.0 / float(np.median(several))
-    return kept_error * math.sqrt(variance * of_cell)
 
 
 def lines_of(facts: MapFacts) -> list[tuple[str, str]]:

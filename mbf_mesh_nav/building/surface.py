@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from mbf_abstract.geometry.arithmetic import tan
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
+from mbf_mesh_nav.building.height_errors import height_errors
 from mbf_mesh_nav.building.heights import HeightLimits, fitted, noise_of_points, settled, smoothed, without_false_ground
 from mbf_mesh_nav.building.holes import without_holes
 from mbf_mesh_nav.building.outliers import isolated_points
@@ -84,8 +85,8 @@ class BuiltSurface:
         Patches that something stands on, of surfaces that are too small, and those that became vertices.
     distances : (n,) float32
         Of points above (+) and below (-) the faces [m]; NaN for points of no face, such as those of trees.
-    kept_error : float
-        Share of the error of a cell's mean that its vertex keeps; 1 where nothing was smoothed.
+    height_errors : (V,) float64
+        Standard errors of the heights of the vertices [m], see ``building.height_errors``.
     """
 
     vertices: FloatArray
@@ -97,7 +98,7 @@ class BuiltSurface:
     is_small: BoolArray
     is_used: BoolArray
     distances: Float32Array
-    kept_error: float
+    height_errors: FloatArray
 
 
 def build_surface(
@@ -152,9 +153,10 @@ def build_surface(
     on_step("error")
     arrays = (patches.firsts, patches.ends, patches.centres, patches.heights)
     distances = distances_to_faces(kept, *arrays, links, is_used, cell, limits.step)
+    errors = height_errors(patches, distances, links, is_used, kept_error)[is_used]
     vertices, faces = _compact(np.column_stack([patches.centres, patches.heights]), faces)
     return BuiltSurface(
-        vertices, faces, patches, kept, is_outlier, is_obstacle, is_small & ~is_used, is_used, distances, kept_error
+        vertices, faces, patches, kept, is_outlier, is_obstacle, is_small & ~is_used, is_used, distances, errors
     )
 
 

@@ -21,7 +21,8 @@ class MapHeader(NamedTuple):
     error_rms, error_95 : float
         Distance of the surveyed points from the surface: root mean square, and what 95 % of them keep.
     height_error : float
-        Standard error of the heights of the vertices, by which layers narrow their limits; 0 = unknown.
+        Standard error of the heights of the vertices, root mean square; 0 = unknown. Layers narrow their limits by it
+        unless the file has that of each vertex, see ``files.vertex_errors``.
     crs : str
         Coordinate system of the survey, such as "EPSG:25832"; "" = unknown.
     """

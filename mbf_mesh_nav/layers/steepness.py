@@ -12,9 +12,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.kernels.mesh.slopes import inclinations
-from mbf_mesh_nav.map.height_error import HeightErrorParameters
+from mbf_mesh_nav.map.height_error import Errors, HeightErrorParameters, angle_of, errors_for
 from mbf_mesh_nav.map.layer import CostArray, LethalArray, MeshLayer
 
 SPACING = 3.0 / (2.0 + math.sqrt(2.0))
@@ -41,10 +43,10 @@ class SteepnessLayer(MeshLayer):
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = inclination [rad] from 0 to pi, lethal above ``threshold`` less the error of the normals."""
         costs = inclinations(self.topology.vertex_normals)
-        return costs, costs > max(self.parameters.threshold - self.normal_error, 0.0)
+        return costs, costs > np.maximum(self.parameters.threshold - self.normal_error, 0.0)
 
     @property
-    def normal_error(self) -> float:
-        """Standard error of a normal in one direction [rad]."""
+    def normal_error(self) -> Errors:
+        """Standard error of a normal in one direction [rad], of all vertices or of each."""
         spacing = SPACING * self.topology.mean_edge_length
-        return math.atan((self.parameters.height_error or 0.0) / (math.sqrt(3.0) * spacing))
+        return angle_of(errors_for(self) / (math.sqrt(3.0) * spacing))

@@ -11,7 +11,8 @@ Rule: the four wheels stand on the surface, the body takes their plane of least 
 heading is allowed if roll, pitch up and pitch down keep their limits, the slope in every direction stays
 ``tip_over_margin`` below the angle at which the centre of mass leaves the wheels, and no vertex inside the footprint
 comes higher than the belly. Wheel positions are taken in the plan view. On a map whose heights have an error, each
-limit is lower by what the slope between two wheels may be wrong, and the belly has as much less room.
+limit is lower by what the slope between two wheels may be wrong, and the belly has as much less room. Where the map
+states the error of each vertex, those under the wheels count.
 Cost: about 10 microseconds a vertex, 144 bytes a vertex.
 """
 
@@ -25,7 +26,15 @@ from pydantic import model_validator
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import BoolArray, Float32Array
 from mbf_mesh_nav.kernels.layers.footprint_settling import settle_footprints, wheel_directions
-from mbf_mesh_nav.map.height_error import HeightErrorParameters
+from mbf_mesh_nav.kernels.layers.wheel_errors import errors_below_wheels
+from mbf_mesh_nav.map.height_error import (
+    Errors,
+    HeightErrorParameters,
+    errors_for,
+    slope_error,
+    step_error,
+    usual_error,
+)
 from mbf_mesh_nav.map.layer import CostArray, LayerContext, LethalArray, MeshLayer
 
 HEADINGS = 16
@@ -56,11 +65,6 @@ class TiltParameters(HeightErrorParameters):
     preferred_headings: float = parameter(
         0.0, "Ground that allows a smaller share of headings costs 1; no effect below needed_headings.", ge=0.0, le=1.0
     )
-
-    @property
-    def room_below(self) -> float:
-        """The ground clearance less the error of the map [m]."""
-        return self.ground_clearance - self.step_error
 
     @model_validator(mode="after")
     def _stands_on_its_wheels(self) -> TiltParameters:
@@ -103,15 +107,17 @@ class TiltLayer(MeshLayer):
 
         Lethal where fewer are allowed than needed. The error of the map narrows what is allowed, not the preference.
         """
-        settings = self.parameters
+        settings, surface = self.parameters, self.topology.surface
+        directions = wheel_directions(HEADINGS, settings.wheelbase, settings.track)
         self.roll, self.pitch, bump = settle_footprints(
-            self.topology.surface,
-            *wheel_directions(HEADINGS, settings.wheelbase, settings.track),
-            settings.wheelbase,
-            settings.track,
-            settings.rigid,
+            surface, *directions, settings.wheelbase, settings.track, settings.rigid
         )
-        self.allowed = (self._usage(self.limits()) <= 1.0) & (bump < settings.room_below)
+        below = errors = errors_for(self)
+        if not isinstance(errors, float):
+            radius = 0.5 * float(np.hypot(settings.wheelbase, settings.track))
+            below = errors_below_wheels(surface, *directions, radius, errors).astype(np.float64)
+            errors = np.sqrt(0.5 * (errors[:, None] * errors[:, None] + below * below))
+        self.allowed = (self._usage(self._limits(below)) <= 1.0) & (bump < self._room_below(errors))
         needed = _count_of(settings.needed_headings)
         last = max(needed, _count_of(settings.preferred_headings)) - 1
         usage = self._usage(self.limits_as_measured())
@@ -120,20 +126,32 @@ class TiltLayer(MeshLayer):
         lethal = np.count_nonzero(self.allowed, axis=1) < needed
         return np.where(np.isinf(ranked), 1.0, ranked).astype(np.float32), lethal
 
-    def _usage(self, limits: tuple[float, float, float]) -> Float32Array:
+    def _usage(self, limits: tuple[Errors, Errors, Errors]) -> Float32Array:
         """Greatest ratio (V, 16) of an angle to its limit."""
         roll_limit, up_limit, down_limit = limits
         sideways = np.abs(self.roll) / roll_limit
         return np.asarray(np.maximum(sideways, np.maximum(self.pitch / up_limit, -self.pitch / down_limit)))
 
     def limits(self) -> tuple[float, float, float]:
-        """Return the limits of roll, pitch up and pitch down [rad] less the error of the map, at least 1e-3."""
-        settings = self.parameters
-        lengths = (settings.track, settings.wheelbase, settings.wheelbase)
-        roll, up, down = (
-            max(limit - settings.slope_error(length), LEAST_LIMIT)
-            for limit, length in zip(self.limits_as_measured(), lengths, strict=True)
-        )
+        """Return the limits of roll, pitch up and pitch down [rad] less the usual error of the map, at least 1e-3."""
+        roll, up, down = (float(limit) for limit in self._limits(usual_error(errors_for(self))))
+        return roll, up, down
+
+    @property
+    def room_below(self) -> float:
+        """The ground clearance less the usual error of the map [m]."""
+        return float(self._room_below(usual_error(errors_for(self))))
+
+    def _room_below(self, errors: Errors) -> Errors:
+        """The ground clearance less the error of a difference between the wheels and what is below the belly [m]."""
+        return self.parameters.ground_clearance - step_error(errors)
+
+    def _limits(self, errors: Errors) -> tuple[Errors, Errors, Errors]:
+        """Limits [rad] for standard errors of the heights under the wheels [m], at least 1e-3."""
+        roll_limit, up_limit, down_limit = self.limits_as_measured()
+        across, along = (slope_error(errors, length) for length in (self.parameters.track, self.parameters.wheelbase))
+        pairs = ((roll_limit, across), (up_limit, along), (down_limit, along))
+        roll, up, down = (np.maximum(limit - error, LEAST_LIMIT) for limit, error in pairs)
         return roll, up, down
 
     def limits_as_measured(self) -> tuple[float, float, float]:

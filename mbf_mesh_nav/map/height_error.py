@@ -1,9 +1,10 @@
 """What a layer keeps free because the heights of a map are not exact.
 
-A map of ``mbf map build`` states the standard error of its heights. The difference of two heights that are wrong
-independently has sqrt(2) times that error, so a slope over a length L may be steeper than it is on the map by
-atan(sqrt(2) error / L). Layers that judge slopes and steps take this off their limits. Layers that judge unevenness by
-itself, such as ``roughness``, do not: errors of the heights make every surface rougher and none smoother.
+A map of ``mbf map build`` states the standard error of the height of each vertex; maps of earlier versions have one
+number for all. The difference of two heights that are wrong independently has sqrt(2) times that error, so a slope over
+a length L may be steeper than it is on the map by atan(sqrt(2) error / L). Layers that judge slopes and steps take this
+off their limits. Layers that judge unevenness by itself, such as ``roughness``, do not: errors of the heights make
+every surface rougher and none smoother.
 """
 
 from __future__ import annotations
@@ -11,10 +12,16 @@ from __future__ import annotations
 import math
 from typing import TypeVar
 
+import numpy as np
+
+from mbf_abstract.geometry.arithmetic import arctan
 from mbf_abstract.parameters import ParameterModel, parameter
-from mbf_mesh_nav.map.layer import LayerParameters
+from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.map.layer import LayerParameters, MeshLayer
 
 Parameters = TypeVar("Parameters", bound=ParameterModel)
+Errors = float | FloatArray
+"""One standard error [m] for all places, or one for each."""
 
 
 class HeightErrorParameters(LayerParameters):
@@ -22,24 +29,44 @@ class HeightErrorParameters(LayerParameters):
 
     height_error: float | None = parameter(
         None,
-        "Standard error of the map's heights, which narrows the limits; absent = as the map file states, or 0.",
+        "Standard error of the map's heights, which narrows the limits, the same everywhere; absent = as the map file "
+        "states for each vertex or for all, or 0.",
         unit="m",
         ge=0.0,
         le=1.0,
     )
 
-    @property
-    def step_error(self) -> float:
-        """Standard error of the difference of two heights [m]."""
-        return math.sqrt(2.0) * (self.height_error or 0.0)
 
-    def slope_error(self, length: float) -> float:
-        """Standard error [rad] of a slope between two places that are ``length`` [m] apart."""
-        return math.atan(self.step_error / length)
+def errors_for(layer: MeshLayer) -> Errors:
+    """Standard error of the heights [m] that a layer counts with: what is configured, or what the map states (V,)."""
+    stated = layer.parameters.height_error if isinstance(layer.parameters, HeightErrorParameters) else None
+    if stated is None and layer.height_errors is not None:
+        return layer.height_errors
+    return stated or 0.0
 
 
-def with_height_error(parameters: Parameters, height_error: float) -> Parameters:
-    """Return parameters that have what the map file states [m] where they state nothing themselves."""
+def usual_error(errors: Errors) -> float:
+    """The median of errors [m], which few bad places do not change."""
+    return errors if isinstance(errors, float) else float(np.median(errors))
+
+
+def step_error(errors: Errors) -> Errors:
+    """Standard error of the difference of two heights [m]."""
+    return math.sqrt(2.0) * errors
+
+
+def slope_error(errors: Errors, length: float) -> Errors:
+    """Standard error [rad] of a slope between two places that are ``length`` [m] apart."""
+    return angle_of(step_error(errors) / length)
+
+
+def angle_of(slopes: Errors) -> Errors:
+    """Arc tangent [rad] of one slope or of many, the same on every CPU."""
+    return math.atan(slopes) if isinstance(slopes, float) else arctan(slopes)
+
+
+def with_height_error(parameters: Parameters, height_error: float | None) -> Parameters:
+    """Return parameters that have what the map file states of all heights [m] where they state nothing themselves."""
     if not isinstance(parameters, HeightErrorParameters) or parameters.height_error is not None:
         return parameters
     return parameters.model_copy(update={"height_error": height_error})

@@ -56,6 +56,8 @@ class LayerContext:
         The layers it reads, in the configured order.
     frame_id : str
         Frame of all coordinates.
+    height_errors : (V,) float64, optional
+        Standard errors of the heights of the vertices [m]; None = the map does not state them vertex by vertex.
     """
 
     name: str
@@ -64,6 +66,7 @@ class LayerContext:
     parameters: LayerParameters
     inputs: tuple[MeshLayer, ...] = ()
     frame_id: str = "map"
+    height_errors: FloatArray | None = None
 
 
 class MeshLayer(map_layer.MapLayer):
@@ -87,6 +90,7 @@ class MeshLayer(map_layer.MapLayer):
         self.topology = context.topology
         self.locator = context.locator
         self.inputs = context.inputs
+        self.height_errors = context.height_errors
         self._costs: CostArray = np.zeros(context.topology.vertex_count, dtype=np.float32)
         self._lethal: LethalArray = np.zeros(context.topology.vertex_count, dtype=np.bool_)
 

@@ -32,7 +32,7 @@ class LayerCache:
     folder : path
         Made if it is missing.
     mesh_digest : str
-        ``MeshTopology.digest()`` of the mesh.
+        Of the mesh and of the errors of its heights, see ``map_builder.digest_of``.
     """
 
     def __init__(self, folder: str | Path, mesh_digest: str) -> None:

@@ -19,6 +19,7 @@ Everything that is wrong with the layers is reported at once, before the mesh is
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -39,6 +40,7 @@ from mbf_abstract.maps.layers.layer_list import (
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.files.map_header import read_map_header
 from mbf_mesh_nav.files.mesh_io import MAX_FACES, SPLIT_CORNERS, read_mesh
+from mbf_mesh_nav.files.vertex_errors import errors_on_mesh, read_vertex_errors
 from mbf_mesh_nav.map.height_error import with_height_error
 from mbf_mesh_nav.map.layer import LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_cache import LayerCache
@@ -202,7 +204,11 @@ def build_mesh_map(
     mesh_map = MeshMap(build_topology(mesh), frame_id, report, parameters.inscribed_radius)
     mesh_map.footprint, mesh_map.max_turning_slope = parameters.footprint, parameters.max_turning_slope
     if plan:
-        plan = [replace(one, parameters=with_height_error(one.parameters, height_error_of(file))) for one in plan]
+        if (errors := read_vertex_errors(Path(file)) if file else None) is not None:
+            mesh_map.height_errors = errors_on_mesh(errors, mesh_map.internal_to_input, mesh_map.faces)
+        else:
+            stated = height_error_of(file)
+            plan = [replace(one, parameters=with_height_error(one.parameters, stated)) for one in plan]
         graph = compute_layers(mesh_map, plan, parameters.cache_dir)
         default = parameters.default_layer or parameters.layers[-1].name
         mesh_map.set_layers(graph, default, parameters.edge_cost_factor)
@@ -212,7 +218,7 @@ def build_mesh_map(
 
 
 def height_error_of(file: str) -> float:
-    """Standard error [m] that a map file states of its heights; 0 for every other one, and for "" (arrays)."""
+    """Standard error [m] that a map file states of all its heights; 0 for every other one, and for "" (arrays)."""
     header = read_map_header(Path(file)) if file else None
     return 0.0 if header is None else header.height_error
 
@@ -257,15 +263,22 @@ def _wrong_inputs(planned: PlannedLayer[MeshLayer]) -> list[str]:
     return [f"layer {entry.name!r} of type {entry.type} takes {wanted} inputs, got {len(entry.reads)}"]
 
 
+def digest_of(mesh_map: MeshMap) -> str:
+    """Hexadecimal SHA-256 of the mesh and, where its file states them, of the errors of its heights."""
+    errors, digest = mesh_map.height_errors, mesh_map.topology.digest()
+    return digest if errors is None else hashlib.sha256(digest.encode() + errors.tobytes()).hexdigest()
+
+
 def compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer[MeshLayer]], cache_dir: str) -> LayerGraph:
     """Compute planned layers on a map, or take them from the folder ``cache_dir``; "" = no cache."""
-    cache = LayerCache(cache_dir, mesh_map.topology.digest()) if cache_dir else None
+    cache = LayerCache(cache_dir, digest_of(mesh_map)) if cache_dir else None
     complaint = ""
     layers: dict[str, MeshLayer] = {}
     for planned in plan:
         inputs = tuple(layers[name] for name in planned.entry.reads)
         name, settings = planned.entry.name, cast(LayerParameters, planned.parameters)
-        context = LayerContext(name, mesh_map.topology, mesh_map.locator, settings, inputs, mesh_map.frame_id)
+        surface = mesh_map.topology, mesh_map.locator
+        context = LayerContext(name, *surface, settings, inputs, mesh_map.frame_id, mesh_map.height_errors)
         layer = planned.layer_class(context)
         stored = cache.load(layer) if cache and layer.cacheable else None
         if stored is not None:

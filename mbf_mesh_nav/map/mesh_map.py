@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.avoided_places import AvoidedPlace
-from mbf_mesh_nav.arrays import IntArray
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, CostArray, LayerParameters, LethalArray, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
@@ -45,9 +45,12 @@ class MeshMap(SnapshotAnswers):
         What was found in, and done to, the mesh when it was loaded.
     frame_id : str
         Frame of all coordinates.
+    height_errors : (V,) float64, optional
+        Standard errors of the heights of the vertices [m]; None if the map's file does not state them one by one.
     """
 
     layers: LayerGraph
+    height_errors: FloatArray | None = None
 
     def __init__(
         self,

@@ -63,7 +63,7 @@ class FootprintLimits:
         settings = layer.parameters
         roll, up, down = (math.tan(limit) for limit in layer.limits())
         measures = settings.wheelbase, settings.track, settings.rigid
-        self.chassis = Chassis(*measures, roll, up, down, settings.room_below)
+        self.chassis = Chassis(*measures, roll, up, down, layer.room_below)
         self._surface = mesh_map.topology.surface
         self._vertex_count = len(mesh_map.vertices)
 

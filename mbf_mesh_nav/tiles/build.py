@@ -128,7 +128,10 @@ class TileBuilder:
         # 1. The mesh of core and overlap, and its layers as on any map.
         own = np.arange(len(part.vertices), dtype=np.int32), np.arange(len(part.faces), dtype=np.int32)
         topology = build_topology(CheckedMesh(part.vertices, part.faces, *own, own[0]))
-        layers = compute_layers(MeshMap(topology, self._settings.frame_id), self._plan, "")
+        part_map = MeshMap(topology, self._settings.frame_id)
+        if part.height_errors is not None:
+            part_map.height_errors = part.height_errors[topology.internal_to_input]
+        layers = compute_layers(part_map, self._plan, "")
         # 2. The core comes first, otherwise all keep the order in which neighbours lie close in memory.
         is_core_face = topology.internal_to_input_faces < part.core_faces
         is_core = np.zeros(topology.vertex_count, dtype=np.bool_)

@@ -34,6 +34,7 @@ def tile(
     with readable_errors():
         from mbf_abstract.server.factory import read_config
         from mbf_abstract.server.standing_server import read_config_text
+        from mbf_mesh_nav.files.vertex_errors import read_vertex_errors
         from mbf_mesh_nav.map.height_error import with_height_error
         from mbf_mesh_nav.map.map_builder import MeshMapParameters, height_error_of
         from mbf_mesh_nav.server import BARE_MESH
@@ -46,7 +47,7 @@ def tile(
             raise typer.BadParameter(f"expected a configuration with a mesh_map, got {config}", param_hint="--config")
         section = checked.sections["mesh_map"]
         parameters = cast(MeshMapParameters, section.parameters)
-        error = height_error_of(str(source))
+        error = None if read_vertex_errors(source) is not None else height_error_of(str(source))
         settings = TileSettings(
             mesh_map=parameters,
             layer_blocks={layer.name: with_height_error(layer.parameters, error) for layer in section.layers},

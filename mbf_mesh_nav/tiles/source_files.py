@@ -8,6 +8,7 @@ import numpy as np
 
 from mbf_mesh_nav.files.elevation_files import ElevationReader, elevation_readers
 from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.files.vertex_errors import errors_on_mesh, read_vertex_errors
 from mbf_mesh_nav.map.map_builder import MeshMapParameters
 from mbf_mesh_nav.mesh.densify import densify
 from mbf_mesh_nav.mesh.mesh_report import MeshError
@@ -59,4 +60,6 @@ def open_source(path: Path, parameters: MeshMapParameters, spacing: float = 0.0)
     mesh, _ = checked_mesh(vertices, faces, repair, str(path), parameters.join_distance)
     if parameters.densify > 0.0:
         mesh = densify(mesh, parameters.densify, file=str(path))
-    return MeshSource(mesh.vertices, mesh.faces)
+    if (errors := read_vertex_errors(path)) is not None:
+        errors = errors_on_mesh(errors, mesh.vertex_source, mesh.faces)
+    return MeshSource(mesh.vertices, mesh.faces, errors)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,12 +27,16 @@ RINGS = 3
 
 @dataclass(frozen=True, eq=False)
 class TilePart:
-    """A part of the map: vertices (n, 3) [m], their numbers (n,) in the map, faces (m, 3), the core's first."""
+    """A part of the map: vertices (n, 3) [m], their numbers (n,) in the map, faces (m, 3), the core's first.
+
+    ``height_errors`` (n,) are the standard errors of the heights [m], None where the map has none for each vertex.
+    """
 
     vertices: FloatArray
     numbers: NDArray[np.int64]
     faces: IntArray
     core_faces: int
+    height_errors: FloatArray | None = None
 
 
 class TileSource(ABC):
@@ -58,10 +62,12 @@ class MeshSource(TileSource):
     ----------
     vertices, faces : (V, 3) float64 [m], (F, 3) int32
         A vertex's number in the map is its place here.
+    height_errors : (V,) float64, optional
+        Standard errors of the heights [m], if the map states them for each vertex.
     """
 
-    def __init__(self, vertices: FloatArray, faces: IntArray) -> None:
-        self._vertices, self._faces = vertices, faces
+    def __init__(self, vertices: FloatArray, faces: IntArray, height_errors: FloatArray | None = None) -> None:
+        self._vertices, self._faces, self._errors = vertices, faces, height_errors
         corners = vertices[:, :2][faces]
         self._centroids = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0
 
@@ -80,12 +86,14 @@ class MeshSource(TileSource):
         for _ in range(RINGS):
             touched = chosen[self._faces].any(axis=1)
             chosen[self._faces[touched]] = True
-        return _numbered_part(self._vertices, self._faces, core, touched & ~core)
+        part = _numbered_part(self._vertices, self._faces, core, touched & ~core)
+        return part if self._errors is None else replace(part, height_errors=self._errors[part.numbers])
 
     def digest(self) -> str:
-        """Of vertices and faces."""
+        """Of vertices, faces and the errors of the heights."""
         digest = hashlib.sha256(np.ascontiguousarray(self._vertices).tobytes())
         digest.update(np.ascontiguousarray(self._faces).tobytes())
+        digest.update(b"" if self._errors is None else self._errors.tobytes())
         return digest.hexdigest()
 
     def _cells(self, tile_size: float) -> NDArray[np.int64]:

@@ -9,21 +9,27 @@ from hypothesis import strategies as st
 
 from mbf_mesh_nav.building.map_build import write_map
 from mbf_mesh_nav.files.map_header import MapHeader, read_map_header
+from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.kernels.layers.footprint_settling import wheel_directions
+from mbf_mesh_nav.kernels.layers.wheel_errors import errors_below_wheels
 from mbf_mesh_nav.layers.height_diff import HeightDiffLayer
 from mbf_mesh_nav.layers.steepness import SteepnessLayer
-from mbf_mesh_nav.layers.tilt import TiltLayer, TiltParameters
-from mbf_mesh_nav.map.height_error import HeightErrorParameters
+from mbf_mesh_nav.layers.tilt import HEADINGS, TiltLayer
+from mbf_mesh_nav.map.height_error import slope_error
 from mbf_mesh_nav.map.layer import LayerContext
 from mbf_mesh_nav.map.map_builder import build_mesh_map, default_layers
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 ERROR = 0.01
 LAYERS = ("steepness", "roughness", "height_diff")
 
 
-def computed(mesh, layer_class, **parameters):
-    layer = layer_class(LayerContext("layer", mesh.topology, mesh.locator, layer_class.Parameters(**parameters)))
+def computed(mesh, layer_class, errors=None, **parameters):
+    chosen = layer_class.Parameters(**parameters)
+    context = LayerContext("layer", mesh.topology, mesh.locator, chosen, height_errors=errors)
+    layer = layer_class(context)
     layer.recompute()
     return layer
 
@@ -38,11 +44,11 @@ def noisy_plane():
 
 @pytest.fixture
 def map_file(tmp_path):
-    """A ramp of 0.55 rad, and a function that writes it with an error of its heights."""
+    """A ramp of 0.55 rad, and a function that writes it with an error of its heights, or one of each vertex."""
 
-    def write(height_error):
+    def write(height_error, errors=None):
         file = tmp_path / f"ramp_{height_error}.ply"
-        write_map(file, *ramp(0.55), MapHeader((0.0, 0.0, 0.0), 0.02, 0.04, height_error))
+        write_map(file, *ramp(0.55), MapHeader((0.0, 0.0, 0.0), 0.02, 0.04, height_error), errors)
         return str(file)
 
     return write
@@ -62,7 +68,8 @@ def test_a_map_file_with_a_negative_error_states_none(map_file):
 def test_the_slope_between_two_wrong_heights_is_as_wrong_as_stated():
     heights = np.random.default_rng(1).normal(0.0, ERROR, (2, 20_000))
     slopes = np.arctan((heights[1] - heights[0]) / 0.5)
-    assert HeightErrorParameters(height_error=ERROR).slope_error(0.5) == pytest.approx(slopes.std(), rel=0.02)
+    assert slope_error(ERROR, 0.5) == pytest.approx(slopes.std(), rel=0.02)
+    np.testing.assert_array_equal(slope_error(np.full(3, ERROR), 0.5), slope_error(ERROR, 0.5))
 
 
 def test_a_normal_over_wrong_heights_is_as_wrong_as_stated():
@@ -96,8 +103,7 @@ def test_limits_and_clearance_of_the_footprint_are_lower_by_the_error():
     exact, wrong = (computed(mesh, TiltLayer, height_error=error) for error in (None, ERROR))
     slopes = [np.arctan(np.sqrt(2.0) * ERROR / length) for length in (0.4, 0.5, 0.5)]
     np.testing.assert_allclose(np.subtract(exact.limits(), wrong.limits()), slopes)
-    parameters = TiltParameters(ground_clearance=0.1, height_error=ERROR)
-    assert parameters.room_below == pytest.approx(0.1 - np.sqrt(2.0) * ERROR)
+    assert wrong.room_below == pytest.approx(wrong.parameters.ground_clearance - np.sqrt(2.0) * ERROR)
 
 
 def test_layers_take_the_error_from_the_map_file(map_file):
@@ -122,3 +128,91 @@ def test_a_map_file_keeps_its_facts(tmp_path, map_file):
     lines = (tmp_path / "map.ply").read_bytes().split(b"\n")
     older.write_bytes(b"\n".join(line for line in lines if b"mbf_height" not in line and b"mbf_crs" not in line))
     assert read_map_header(older) == MapHeader(header.origin, 0.02, 0.04)
+
+
+ONE_BAD_PLACE = np.where(np.arange(21 * 21) == 10 * 21 + 10, 0.1, 0.0)
+"""Errors of the vertices of a ramp: that of the middle one is 0.1 m."""
+
+
+def test_layers_are_narrower_only_where_the_file_says_that_heights_are_wrong(map_file):
+    vertices, _ = read_mesh(map_file(0.02, ONE_BAD_PLACE))
+    narrowed = built(map_file(0.02, ONE_BAD_PLACE))
+    lethal = narrowed.layers["steepness"].lethal
+    np.testing.assert_allclose(narrowed.vertices[lethal], vertices[ONE_BAD_PLACE > 0.0])
+    assert narrowed.layers["steepness"].parameters.height_error is None
+    assert not built(map_file(0.02, ONE_BAD_PLACE), steepness={"height_error": 0.0}).layers["steepness"].lethal.any()
+
+
+def test_a_vertex_that_densifying_adds_has_the_greatest_error_of_its_neighbours(map_file):
+    parameters, blocks = default_layers(0.3)
+    file = map_file(0.02, ONE_BAD_PLACE)
+    mesh_map = build_mesh_map(parameters.model_copy(update={"mesh_file": file, "densify": 0.08}), blocks)
+    away = np.linalg.norm(mesh_map.vertices - read_mesh(file)[0][10 * 21 + 10], axis=1)
+    assert len(mesh_map.vertices) > 3 * 21 * 21
+    np.testing.assert_allclose(mesh_map.height_errors[away < 0.06], 0.1)
+    assert (mesh_map.height_errors[away > 0.12] == 0.0).all()
+
+
+@pytest.mark.parametrize("wrong", [-0.01, np.nan, np.inf])
+def test_a_map_file_with_an_impossible_error_of_a_vertex_is_refused(map_file, wrong):
+    file = map_file(0.02, np.where(ONE_BAD_PLACE > 0.0, wrong, 0.01))
+    with pytest.raises(MeshError, match=r"height_error of its vertices: expected finite numbers of at least 0"):
+        built(file)
+
+
+def test_one_error_of_all_vertices_narrows_the_tilt_as_one_number_does():
+    mesh = MeshMap.from_heights(np.random.default_rng(4).normal(0.0, 0.08, (14, 14)), 0.2, 0.2)
+    one = computed(mesh, TiltLayer, height_error=0.02, rigid=True)
+    each = computed(mesh, TiltLayer, np.full(14 * 14, 0.02), rigid=True)
+    np.testing.assert_array_equal(one.allowed, each.allowed)
+    np.testing.assert_allclose(one.limits(), each.limits())
+
+
+def wheel_errors_one_by_one(mesh, wheelbase, track, errors):
+    """Naive twin of ``errors_below_wheels``: wheels found from above, on the only face there."""
+    result = np.zeros((len(mesh.vertices), HEADINGS))
+    for vertex, centre in enumerate(mesh.vertices):
+        for heading in range(HEADINGS):
+            yaw, squares = 2.0 * np.pi * heading / HEADINGS, []
+            for ahead, left in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
+                x, y = 0.5 * ahead * wheelbase, 0.5 * left * track
+                place = centre[:2] + np.array([np.cos(yaw) * x - np.sin(yaw) * y, np.sin(yaw) * x + np.cos(yaw) * y])
+                face = mesh.locator.cast_rays([[*place, 10.0]], [[0.0, 0.0, -1.0]])[0][0]
+                corners = [vertex] if face < 0 else mesh.faces[face]
+                squares.append(np.mean(errors[corners] ** 2))
+            result[vertex, heading] = np.sqrt(np.mean(squares))
+    return result
+
+
+@settings(deadline=None, max_examples=8)
+@given(st.integers(0, 1000))
+def test_the_error_below_the_wheels_is_that_of_the_faces_they_stand_on(seed):
+    rng = np.random.default_rng(seed)
+    mesh = MeshMap.from_heights(rng.normal(0.0, 0.05, (7, 6)), 0.2, 0.23)
+    errors, wheelbase, track = rng.uniform(0.0, 0.1, len(mesh.vertices)), 0.51, 0.37
+    directions = wheel_directions(HEADINGS, wheelbase, track)
+    found = errors_below_wheels(mesh.topology.surface, *directions, 0.5 * np.hypot(wheelbase, track), errors)
+    np.testing.assert_allclose(found, wheel_errors_one_by_one(mesh, wheelbase, track, errors), rtol=1e-5)
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.integers(0, 1000))
+def test_greater_errors_of_places_close_more_ground_and_open_none(seed):
+    rng = np.random.default_rng(seed)
+    mesh = MeshMap.from_heights(rng.normal(0.0, 0.08, (14, 14)), 0.2, 0.2)
+    less = rng.uniform(0.0, 0.03, len(mesh.vertices))
+    more = less + rng.uniform(0.0, 0.03, len(mesh.vertices))
+    for layer_class in (SteepnessLayer, HeightDiffLayer, TiltLayer):
+        low, high = (computed(mesh, layer_class, errors) for errors in (less, more))
+        assert (high.lethal | ~low.lethal).all()
+        if layer_class is TiltLayer:
+            assert (low.allowed | ~high.allowed).all()
+
+
+def test_stored_layers_of_other_errors_are_not_taken(tmp_path, map_file):
+    parameters, blocks = default_layers(0.3)
+    for round_of_builds in range(2):
+        for errors in (None, 0.0 * ONE_BAD_PLACE, ONE_BAD_PLACE):
+            chosen = {"mesh_file": map_file(0.02, errors), "cache_dir": str(tmp_path / "layers")}
+            build_mesh_map(parameters.model_copy(update=chosen), blocks)
+        assert len(list((tmp_path / "layers").glob("HeightDiffLayer-*"))) == 3, round_of_builds

@@ -10,11 +10,17 @@ from typer.testing import CliRunner
 from mbf_abstract.cli import make_app
 from mbf_mesh_nav.building.map_build import write_map
 from mbf_mesh_nav.files.map_header import MapHeader
+from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh.densify import densify
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.repair import checked_mesh
 from mbf_mesh_nav.tiles.index import read_index
+from mbf_mesh_nav.tiles.tile import read_tile, tile_file
 
+JUDGING = (
+    "backend: mesh\nmesh_map:\n  layers: [{name: height_diff, type: height_diff}, {name: tilt, type: tilt}]\n"
+    "  height_diff: {height_limit: 1.0}\n"
+)
 DENSE = "backend: mesh\nmesh_map:\n  layers: [{name: slopes, type: steepness}]\n  densify: 0.2\n"
 
 
@@ -52,6 +58,30 @@ def test_the_layers_are_those_of_a_configuration(heights, tmp_path):
     assert done.exit_code == 0, done.output
     index = read_index(out)
     assert index.layers == ("slopes",) and index.profile()[1].edge_cost_factor == 2.0
+
+
+def test_tiles_of_a_built_map_count_with_the_error_of_each_vertex(heights, tmp_path):
+    vertices, faces = heightfield_mesh(np.load(heights), SPACING, SPACING)
+    errors = np.random.default_rng(5).uniform(0.0, 0.1, len(vertices))
+    file, config, differ = tmp_path / "mesh.ply", tmp_path / "robot.yaml", 0
+    config.write_text(JUDGING, "utf-8")
+    write_map(file, vertices, faces, MapHeader((0, 0, 0), 0, 0, 0.05), errors)
+    done = run(file, "--out", tmp_path / "map", "--tile-size", 12, "--config", config)
+    assert done.exit_code == 0, done.output
+    entries = [MeshLayerEntry(name=name, type=name) for name in ("height_diff", "tilt")]
+    blocks = {"height_diff": {"height_limit": 1.0}}
+    chosen = MeshMapParameters(mesh_file=str(file), layers=tuple(entries))
+    whole = build_mesh_map(chosen, blocks)
+    exact = build_mesh_map(
+        chosen, {"height_diff": {"height_limit": 1.0, "height_error": 0.0}, "tilt": {"height_error": 0.0}}
+    )
+    for entry in read_index(tmp_path / "map").tiles:
+        tile = read_tile(tile_file(tmp_path / "map", entry.key))
+        internal = whole.input_to_internal[tile.numbers[: tile.core_vertices]]
+        for row, name in enumerate(("height_diff", "tilt")):
+            np.testing.assert_array_equal(tile.lethal[row], whole.layers[name].lethal[internal])
+            differ += (tile.lethal[row] != exact.layers[name].lethal[internal]).sum()
+    assert differ
 
 
 def test_a_mesh_is_densified_as_the_configuration_says(tmp_path):

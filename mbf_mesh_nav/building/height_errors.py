@@ -1,0 +1,66 @@
+"""How wrong the height of each vertex of a built map may be, as far as its points tell.
+
+Two things make a height wrong. The noise of the points is what is left of it in the mean of a cell. And where points
+disagree by more than their noise, they have seen ground that the faces do not show: relief between the vertices, or a
+boulder that scans from wrong poses have put to several places, so that it is a low hill on the map. Their spread beyond
+the noise is how far the ground is from the faces there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
+from mbf_mesh_nav.building.heights import MEDIAN_OF_ERRORS
+from mbf_mesh_nav.building.surface_patches import SurfacePatches
+from mbf_mesh_nav.kernels.building.disagreement import INVERSES, PATCHES, POINTS, SQUARES, sums_around
+
+BY_CHANCE = 2.0
+"""Standard errors by which the variance of the points of a place may exceed that of all."""
+
+
+def height_errors(
+    patches: SurfacePatches, distances: NDArray[np.float32], links: IntArray, used: BoolArray, kept_error: float
+) -> FloatArray:
+    """Standard errors (P,) [m] of the heights of patches, of the place that is a patch and those linked to it.
+
+    The variance of the noise is that of the median distance of all points, which boulders do not change. A cell takes
+    one degree of freedom of its points, less if its height was smoothed. The mean of a cell has the variance of a
+    point over their number, on average over the place; where heights are smoothed, cells with few points lean on
+    their neighbours, and the usual number counts. A place without a point, in a filled hole, has that of one point. To
+    it comes the variance of the place beyond that of the noise, unless chance explains it: the variance of n
+    normally distributed points has the standard error sqrt(2 / n) of itself. Errors that all points of a place have in
+    common, as of scans from a drifting pose, lift it as a whole; they are not in it.
+
+    Parameters
+    ----------
+    distances : (n,) float32
+        Of the points from the faces [m], sorted as the patches number them; NaN for points of no face.
+    links : (P, 8) int32
+        As in ``kernels.building.patches``.
+    used : (P,) bool
+        Patches that are vertices.
+    kept_error : float
+        Share of the error of a cell's mean that smoothing lets through; 1 = nothing was smoothed.
+    """
+    known = np.abs(distances[np.isfinite(distances)].astype(np.float64))
+    if not len(known):
+        return np.zeros(len(patches.cells))
+    counts = (patches.ends - patches.firsts)[used & ~patches.is_filled]
+    noise = float(np.median(known)) / MEDIAN_OF_ERRORS
+    noise *= np.sqrt(len(known) / max(len(known) - kept_error * len(counts), 1.0))
+    sums = sums_around(distances, patches.firsts, patches.ends, links, used)
+    points, cells = np.maximum(sums[:, POINTS], 1.0), np.maximum(sums[:, PATCHES], 1.0)
+    of_cell = np.where(sums[:, PATCHES] > 0.0, sums[:, INVERSES] / cells, 1.0)
+    if kept_error < 1.0:
+        of_cell = np.full(len(points), 1.0 / np.median(counts))
+    by_chance = noise * noise * (1.0 + BY_CHANCE * np.sqrt(2.0 / points))
+    variance = sums[:, SQUARES] / np.maximum(points - kept_error * sums[:, PATCHES], 1.0)
+    unresolved = np.maximum(variance - by_chance, 0.0)
+    return np.asarray(np.sqrt(kept_error * kept_error * noise * noise * of_cell + unresolved))
+
+
+def root_mean_square(errors: FloatArray) -> float:
+    """One number for errors (n,); 0 without any."""
+    return float(np.sqrt((errors * errors).mean())) if len(errors) else 0.0
