@@ -1,4 +1,4 @@
-"""How wrong the height of each vertex of a built map may be, as far as its points tell.
+"""How wrong the height of each vertex of a built map may be, as far as its points show.
 
 Two things make a height wrong. The noise of the points is what is left of it in the mean of a cell. And where points
 disagree by more than their noise, they have seen ground that the faces do not show: relief between the vertices, or a
