@@ -22,7 +22,7 @@ from mbf_mesh_nav.kernels.layers.patches import (
     height_differences_by_patches,
     patch_borders,
 )
-from mbf_mesh_nav.map.height_error import HeightErrorParameters, errors_for, step_error
+from mbf_mesh_nav.map.height_error import HeightErrorParameters, errors_for, narrowed, step_error
 from mbf_mesh_nav.map.layer import CostArray, LethalArray, MeshLayer
 
 _DENSE = 16.0
@@ -54,7 +54,7 @@ class HeightDiffLayer(MeshLayer):
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = height difference [m], lethal above ``threshold`` less the error of a difference."""
         costs, settings = self._differences(), self.parameters
-        return costs, costs > np.maximum(settings.threshold - step_error(errors_for(self)), 0.0)
+        return costs, costs > narrowed(settings.threshold, step_error(errors_for(self)), 0.0)
 
     def _differences(self) -> CostArray:
         """Height differences (V,) [m]; dense meshes by patches, which gives the same values."""

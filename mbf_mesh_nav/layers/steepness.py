@@ -12,11 +12,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.kernels.mesh.slopes import inclinations
-from mbf_mesh_nav.map.height_error import Errors, HeightErrorParameters, angle_of, errors_for
+from mbf_mesh_nav.map.height_error import Errors, HeightErrorParameters, angle_of, errors_for, narrowed
 from mbf_mesh_nav.map.layer import CostArray, LethalArray, MeshLayer
 
 SPACING = 3.0 / (2.0 + math.sqrt(2.0))
@@ -43,7 +41,7 @@ class SteepnessLayer(MeshLayer):
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = inclination [rad] from 0 to pi, lethal above ``threshold`` less the error of the normals."""
         costs = inclinations(self.topology.vertex_normals)
-        return costs, costs > np.maximum(self.parameters.threshold - self.normal_error, 0.0)
+        return costs, costs > narrowed(self.parameters.threshold, self.normal_error, 0.0)
 
     @property
     def normal_error(self) -> Errors:

@@ -31,6 +31,7 @@ from mbf_mesh_nav.map.height_error import (
     Errors,
     HeightErrorParameters,
     errors_for,
+    narrowed,
     slope_error,
     step_error,
     usual_error,
@@ -151,7 +152,7 @@ class TiltLayer(MeshLayer):
         roll_limit, up_limit, down_limit = self.limits_as_measured()
         across, along = (slope_error(errors, length) for length in (self.parameters.track, self.parameters.wheelbase))
         pairs = ((roll_limit, across), (up_limit, along), (down_limit, along))
-        roll, up, down = (np.maximum(limit - error, LEAST_LIMIT) for limit, error in pairs)
+        roll, up, down = (narrowed(limit, error, LEAST_LIMIT) for limit, error in pairs)
         return roll, up, down
 
     def limits_as_measured(self) -> tuple[float, float, float]:

@@ -55,6 +55,12 @@ def step_error(errors: Errors) -> Errors:
     return math.sqrt(2.0) * errors
 
 
+def narrowed(limit: float, errors: Errors, least: float) -> Errors:
+    """A limit less its errors, at least ``least``; a plain number for one error, which keeps layers in four bytes."""
+    rest = limit - errors
+    return max(rest, least) if isinstance(rest, float) else np.maximum(rest, least)
+
+
 def slope_error(errors: Errors, length: float) -> Errors:
     """Standard error [rad] of a slope between two places that are ``length`` [m] apart."""
     return angle_of(step_error(errors) / length)
