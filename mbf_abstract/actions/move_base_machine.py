@@ -15,7 +15,7 @@ from mbf_abstract.execution.plan_check import in_global_frame
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.goals.arrival_tolerance import tolerance_left
+from mbf_abstract.goals.arrival_tolerance import planned_tolerance, tolerance_left
 from mbf_abstract.goals.goal_types import (
     ExePathFeedback,
     GetPathResult,
@@ -115,7 +115,7 @@ class MoveBaseMachine:
         self._planned_floor = self._runtime.map_hooks.floors_taken()
         if self._goals.follow is None:
             self._enter(MoveBaseState.GET_PATH)
-        self._goals.send_plan(self._target, self._via.plan())
+        self._goals.send_plan(self._target, self._via.plan(), self._planned_tolerance())
 
     def _on_plan(self, result: Any) -> End | None:
         if isinstance(result, RefinePathResult) and result.refined_path is not None:  # the plan itself without success
@@ -174,6 +174,11 @@ class MoveBaseMachine:
         self._followed_floor = self._planned_floor
         self._enter(MoveBaseState.EXE_PATH)
         self._goals.send_path(path, self._arrival_tolerance(path))
+
+    def _planned_tolerance(self) -> float | None:
+        """How far [m] from the target a plan may end; None = by the goal's area alone."""
+        goal = self._job.handle.goal
+        return goal.dist_tolerance if goal.goal_area is not None else planned_tolerance(self._dist_tolerance)
 
     def _arrival_tolerance(self, path: Path) -> float | None:
         """What a path that ends off the target leaves of the tolerance [m]; None = the server's."""

@@ -56,15 +56,15 @@ class SubGoals:
         self._mailbox: deque[AnyGoalHandle] = deque()
 
     # ---------------------------------------------------------------------------------------------------- sending
-    def send_plan(self, target: Pose, via: tuple[Pose, ...]) -> None:
-        """Ask for a plan of the job's goal."""
+    def send_plan(self, target: Pose, via: tuple[Pose, ...], dist_tolerance: float | None) -> None:
+        """Ask for a plan of the job's goal, which may end so far [m] from the target; None = as ``get_path`` has it."""
         goal = self._job.handle.goal
         self.plan = self._send(
             self._actions.get_path,
             GetPathGoal(
                 target,
                 planner=goal.planner,
-                dist_tolerance=goal.dist_tolerance,
+                dist_tolerance=dist_tolerance,
                 angle_tolerance=goal.angle_tolerance,
                 goal_area=goal.goal_area,
                 via=via,

@@ -14,7 +14,7 @@ from py_trees.common import Status
 
 from mbf_abstract.executives.nodes import Leaf
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.goals.arrival_tolerance import tolerance_left
+from mbf_abstract.goals.arrival_tolerance import planned_tolerance, tolerance_left
 from mbf_abstract.goals.goal_types import (
     ActionResult,
     ExePathGoal,
@@ -99,7 +99,8 @@ class GetPath(ActionLeaf):
     planner : str
         Empty = the first one loaded.
     dist_tolerance, angle_tolerance : float
-        As in ``GetPathGoal`` [m, rad].
+        As in ``GetPathGoal`` [m, rad]; without a distance a path to the mission's target leaves some of the server's
+        tolerance for the drive.
     slot : int
         Give a second planner that runs beside the first a slot of its own.
     refiner : str
@@ -132,10 +133,16 @@ class GetPath(ActionLeaf):
         return GetPathGoal(
             self.target or self.mission.required_target(),
             planner=self.planner,
-            dist_tolerance=self.dist_tolerance,
+            dist_tolerance=self._planned_tolerance(),
             angle_tolerance=self.angle_tolerance,
             concurrency_slot=self.slot,
         )
+
+    def _planned_tolerance(self) -> float | None:
+        """How far [m] from the target the path may end; None = as ``get_path`` has it."""
+        if self.dist_tolerance is not None or self.target is not None:
+            return self.dist_tolerance
+        return planned_tolerance(self.mission.navigator.server.runtime.parameters.dist_tolerance)
 
     def following_goal(self, result: ActionResult) -> Any:
         """Refine a plan, where a refiner is given."""

@@ -1,4 +1,8 @@
-"""How near the robot must come to the end of a path that does not reach its target."""
+"""How near its target a path must end, and how near its end a robot must come, to arrive within one tolerance.
+
+A path may end beside its target, where that is occupied. Path and robot then share the arrival tolerance: a path that is
+to be driven may end off the target by all but a quarter of it, and the robot has what is left.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +10,16 @@ LEAST_SHARE_LEFT = 0.25
 """Of the tolerance, for stopping at the end of a path that does not reach the target."""
 
 
+def planned_tolerance(tolerance: float) -> float:
+    """Distance [m] from its target at which a path may end that is driven to within ``tolerance`` [m] of it."""
+    return (1.0 - LEAST_SHARE_LEFT) * tolerance
+
+
 def tolerance_left(tolerance: float, off: float) -> float | None:
-    """What a path that ends ``off`` [m] its target leaves of the arrival tolerance [m]; None = all of it."""
+    """What a path that ends ``off`` [m] its target leaves of the arrival tolerance [m]; None = all of it.
+
+    At least a quarter, for paths of planners that were allowed more, e.g. while a recovery relaxes their tolerance.
+    """
     if off == 0.0 or tolerance == 0.0:
         return None
     return max(tolerance - off, LEAST_SHARE_LEFT * tolerance)

@@ -52,6 +52,13 @@ def test_a_robot_whose_path_ends_beside_the_target_comes_the_nearer_to_its_end(m
     assert session.robot.pose.distance_to(GOAL) <= 0.2
 
 
+def test_a_path_as_short_of_the_target_as_the_planner_may_end_it_leads_to_within_the_tolerance(make_session):
+    session = make_session(dist_tolerance=0.2)
+    session.planner.play(lambda asked: straight_plan(replace(asked, goal=Pose.planar(2.0 - asked.dist_tolerance, 0.0))))
+    assert run(session, navigation_tree(OPTIONS)).success
+    assert session.robot.pose.distance_to(GOAL) <= 0.2
+
+
 def test_a_failed_plan_is_followed_by_the_next_recovery_of_the_list(make_session, recoveries):
     session = make_session()
     session.planner.play(NO_PATH, NO_PATH, straight_plan)

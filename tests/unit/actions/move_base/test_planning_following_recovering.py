@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.arrival_tolerance import planned_tolerance
 from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
@@ -43,7 +44,7 @@ def test_the_goals_tolerances_reach_planner_and_controller(make_session):
     session = make_session()
     result = session.send(dist_tolerance=0.7, angle_tolerance=0.3).wait()
     request = session.planner.requests[0]
-    assert (request.dist_tolerance, request.angle_tolerance) == (0.7, 0.3)
+    assert (request.dist_tolerance, request.angle_tolerance) == (planned_tolerance(0.7), 0.3)
     assert 0.3 < result.dist_to_goal < 0.75
 
 
@@ -51,7 +52,15 @@ def test_without_tolerances_of_the_goal_those_of_the_server_reach_the_planner(ma
     session = make_session(dist_tolerance=0.4, angle_tolerance=0.5)
     session.send().wait()
     request = session.planner.requests[0]
-    assert (request.dist_tolerance, request.angle_tolerance) == (0.4, 0.5)
+    assert (request.dist_tolerance, request.angle_tolerance) == (planned_tolerance(0.4), 0.5)
+
+
+def test_a_path_as_short_of_the_target_as_the_planner_may_end_it_leads_to_within_the_tolerance(make_session):
+    session = make_session(dist_tolerance=0.4)
+    session.planner.play(lambda asked: straight_plan(replace(asked, goal=Pose.planar(2.0 - asked.dist_tolerance, 0.0))))
+    result = session.send().wait()
+    assert result.success
+    assert result.final_pose.distance_to(Pose.planar(2.0, 0.0)) <= 0.4
 
 
 @pytest.mark.parametrize(("off", "farthest"), [(0.1, 0.4), (0.3, 0.4), (0.39, 0.5)])
