@@ -24,8 +24,8 @@ FloatArray = NDArray[np.float64]
 
 SEARCH_WINDOW = 2.0
 """How far ahead of the last progress [m] the nearest point is searched."""
-CUSP_REACHED = 0.1
-"""This near [m] to a cusp, along the path, the robot goes on to the part of the path behind it."""
+CUSP_REACHED, SHARE_OF_SECTION = 0.1, 0.1
+"""This near [m] to a cusp, and past all but this share of the section before it, the robot goes on to the next one."""
 LEADS_AWAY = (1.5, 0.1)
 """The path leads away where it is farther from the robot than this factor times the least distance plus this [m]."""
 SAME_PLACE = 0.3
@@ -35,6 +35,8 @@ ARM, GAINED = 0.2, 0.2
 
 That is a turn of 120 degrees; on a smooth bend, one of a radius below 0.11 m.
 """
+SHORT_ARM = 0.1
+"""The path leads to a cusp as it does over so much [m] before it."""
 CHUNK = 32
 """Number of segments that are checked in one step."""
 _POSITION_NOISE = 1e-9  # [m]
@@ -105,6 +107,12 @@ class PathTracker:
         return float(self.cusps[min(ahead, len(self.cusps) - 1)])
 
     @property
+    def last_cusp(self) -> float:
+        """Length along the path [m] of the cusp before the next one, or of the start."""
+        behind = int(np.searchsorted(self.cusps, self.progress + _POSITION_NOISE))
+        return float(self.cusps[behind - 1]) if behind > 0 else 0.0
+
+    @property
     def to_cusp(self) -> float:
         """Length [m] to the next cusp, or to the end."""
         return self.next_cusp - self.progress
@@ -128,7 +136,7 @@ class PathTracker:
         cusp = self.next_cusp
         place = robot.tolist()
         self._advance(self._nearest_ahead(place, min(self.progress + window, cusp)))
-        if cusp < self.length and cusp - self.progress <= CUSP_REACHED:
+        if cusp < self.length and cusp - self.progress <= min(CUSP_REACHED, SHARE_OF_SECTION * (cusp - self.last_cusp)):
             self._advance(cusp)
         self.deviation = _norm(c - r for c, r in zip(self._point_at(self.progress), place, strict=True))
 
@@ -151,6 +159,18 @@ class PathTracker:
         begin, end = self.lengths[segment : segment + 2].tolist()
         corner, following = self.points[segment : segment + 2].tolist()
         return [(f - c) / (end - begin) * (length - begin) + c for c, f in zip(corner, following, strict=True)]
+
+    def straight_on(self, distance: float) -> FloatArray:
+        """Point (dimensions,) ``distance`` [m] ahead on the path; past the next cusp, or the end, straight on.
+
+        A robot that steers to a cusp itself turns ever more the nearer it comes, if it is a little beside the path.
+        """
+        cusp = self.next_cusp
+        beyond = self.progress + distance - cusp
+        if beyond <= 0.0:
+            return self.point_at(cusp + beyond)
+        end, before = self.point_at(cusp), self.point_at(max(cusp - SHORT_ARM, 0.0))
+        return np.asarray(end + (end - before) * (beyond / SHORT_ARM))
 
     def points_at(self, lengths: FloatArray) -> FloatArray:
         """Points (m, dimensions) of the path at ``lengths`` (m,) [m] along it, clamped to its ends."""

@@ -1,7 +1,7 @@
 """How near its target a path must end, and how near its end a robot must come, to arrive within one tolerance.
 
-A path may end beside its target, where that is occupied. Path and robot then share the arrival tolerance: a path that is
-to be driven may end off the target by all but a quarter of it, and the robot has what is left.
+A path may end beside its target, where that is occupied. Path and robot then share the arrival tolerance: a path that
+is to be driven may end off the target by all but a quarter of it, and the robot has what is left.
 """
 
 from __future__ import annotations

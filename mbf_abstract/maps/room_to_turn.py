@@ -118,13 +118,9 @@ def along_path(tracker: PathTracker, pose: Pose, backward: bool = False) -> list
     Where the outline fits on the path (``poses_ahead``) these arcs are free although the one to a point farther ahead,
     which cuts the path's corners, is not. None where the robot does not look along the path.
     """
-    motions, cusp = [], tracker.next_cusp
-    end, before = tracker.point_at(cusp), tracker.point_at(max(cusp - NEAR[-1], 0.0))
+    motions = []
     for distance in NEAR:
-        beyond = tracker.progress + distance - cusp
-        # Past a cusp the arc leads straight on.
-        point = end + (end - before) * (beyond / NEAR[-1]) if beyond > 0.0 else tracker.point_at(cusp + beyond)
-        x, y = point.tolist()
+        x, y = tracker.straight_on(distance).tolist()
         bearing, curvature = arc_to(pose, np.array([x, y, pose.z]))
         if abs(off_course(bearing, backward)) <= LOOKS_ALONG:
             speed = -CREEPING if backward else CREEPING

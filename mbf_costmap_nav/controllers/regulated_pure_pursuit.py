@@ -14,6 +14,8 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
+import numpy as np
+
 from mbf_abstract.geometry import Path, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.room_to_turn import (
@@ -185,12 +187,18 @@ class RegulatedPurePursuitController(PathFollower):
         motions = [motion for motion in close if abs(motion.wz) * self.turning_radius <= abs(motion.vx)]
         if self._at_goal or not self.rotates:
             return motions
-        carrot = self._carrot(cycle)
-        error = off_course(math.atan2(carrot[1], carrot[0]), backward)
+        error = self._angle_left(cycle)
         return [*motions, self._turn(cycle, error)] if abs(error) > SMALL_TURN else motions
 
     def _backward(self, cycle: ControlCycle) -> bool:
         return self.parameters.allow_reversing and cycle.tracker.driving_backward
+
+    def _angle_left(self, cycle: ControlCycle) -> float:
+        """Angle [rad] to the goal's heading where the robot stands at the goal, else to the carrot."""
+        if (turn := self._turn_at_goal(cycle)) is not None:
+            return turn
+        carrot = self._carrot(cycle)
+        return off_course(math.atan2(carrot[1], carrot[0]), self._backward(cycle))
 
     def _turn(self, cycle: ControlCycle, angle: float) -> Twist:
         return Twist.planar(wz=self.rotation_speed(angle, cycle.request.velocity.wz))
@@ -228,10 +236,13 @@ class RegulatedPurePursuitController(PathFollower):
         return speed
 
     def _carrot(self, cycle: ControlCycle) -> tuple[float, float]:
-        """Look-ahead point in the base frame; it does not pass a cusp."""
-        distance = self.look_ahead_distance(cycle.request.velocity.vx)
-        reach = min(distance + cycle.tracker.deviation, cycle.tracker.to_cusp)
-        local = to_base_frame(cycle.tracker.ahead(reach), cycle.request.pose)
+        """Look-ahead point in the base frame; past a cusp it lies straight on."""
+        tracker, distance = cycle.tracker, self.look_ahead_distance(cycle.request.velocity.vx)
+        wanted = distance + tracker.deviation
+        points = tracker.ahead(min(wanted, tracker.to_cusp))
+        if wanted > tracker.to_cusp and not tracker.on_last_section:
+            points = np.vstack([points, tracker.straight_on(wanted)])
+        local = to_base_frame(points, cycle.request.pose)
         x, y = look_ahead_point(local, distance)
         return float(x), float(y)
 
@@ -280,13 +291,15 @@ class RegulatedPurePursuitController(PathFollower):
         return ControlResult(ExePathOutcome.BLOCKED_PATH if reason else ExePathOutcome.SUCCESS, reason, command)
 
     def _blocked(self, cycle: ControlCycle, command: Twist) -> str:
-        """Where a command leads into an obstacle in the check time, not beyond the path's end; empty if free."""
+        """Where a command leads into an obstacle in the check time, not beyond the next cusp; empty if free."""
         duration, shortest = self.parameters.collision_check_time, self.parameters.min_distance_to_obstacle
         if command.vx != 0.0:  # a robot that may creep as far as the check time allows ends up at the obstacle
             duration = max(duration, shortest / max(abs(command.vx), SLOWEST))
         duration /= cycle.limit_factor
-        if command.vx != 0.0:
-            duration = min(duration, max(cycle.tracker.remaining, 0.0) / abs(command.vx))
+        if command.vx != 0.0:  # it stops at a cusp
+            duration = min(duration, cycle.tracker.to_cusp / abs(command.vx))
+        elif command.wz != 0.0:  # and where it has turned to what it turns to
+            duration = min(duration, abs(self._angle_left(cycle)) / abs(command.wz))
         outline_speed = abs(command.vx) + abs(command.wz) * cycle.footprint.footprint.circumscribed_radius
         # Half a cell of the outline from pose to pose, and among them those of the next cycles.
         period = self.parameters.control_period

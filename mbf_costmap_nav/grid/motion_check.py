@@ -3,11 +3,16 @@
 A robot that already touches an obstacle may move as long as it touches no more than before, so backing out of a
 collision works and driving deeper into it does not. Where the whole footprint lies on obstacles no direction is known
 to lead out, and only ``escape`` may move.
+
+A robot that touches nothing collides where planners and controllers say so, by the samples of ``FootprintCheck``: a
+corner of a cell that the outline clips by less than a quarter of its side counts for none of them. Otherwise a path
+that a planner has returned could be refused.
 """
 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -15,6 +20,8 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.kernels.map.footprint_cost import OUTSIDE
 from mbf_costmap_nav.kernels.map.rasterisation import blocked_under
 
 
@@ -44,9 +51,20 @@ def obstacle_ahead(
     ahead = arc_poses((pose.x, pose.y, pose.yaw), command.vx, command.vy, command.wz, duration, step)
     for x, y, yaw in ahead.tolist():
         blocked, covered = blocked_cells(costmap, footprint, x, y, yaw)
-        if blocked > allowed or (blocked == covered and not leaves_collisions):
+        deeper = blocked > allowed and (allowed > 0 or _collides(costmap, footprint, x, y, yaw))
+        if deeper or (blocked == covered and not leaves_collisions):
             return f"an obstacle is in the way: the footprint would touch it at ({x:.2f}, {y:.2f}, {yaw:.2f} rad)"
     return ""
+
+
+def _collides(costmap: Costmap, footprint: Footprint, x: float, y: float, yaw: float) -> bool:
+    """Whether the samples of the footprint touch a lethal cell or leave the map."""
+    return _check(footprint, costmap.resolution).cost(costmap, x, y, yaw) in (LETHAL, OUTSIDE)
+
+
+@lru_cache(maxsize=8)
+def _check(footprint: Footprint, resolution: float) -> FootprintCheck:
+    return FootprintCheck(footprint, resolution)
 
 
 def blocked_cells(costmap: Costmap, footprint: Footprint, x: float, y: float, yaw: float) -> tuple[int, int]:

@@ -128,14 +128,19 @@ class PathFollower(SurfaceFollower):
         """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""
         p = self.parameters
         tracker = self._tracker
-        target = tracker.point_at(min(tracker.progress + p.look_ahead_dist, tracker.next_cusp))
+        if tracker.on_last_section:
+            target = tracker.point_at(tracker.progress + p.look_ahead_dist)
+        else:
+            target = tracker.straight_on(p.look_ahead_dist)
         bearing, curvature = arc_to(pose, target)
         if abs(bearing) > p.rotate_to_heading_min_angle:
             return self._command(0.0, p.turn_gain * bearing)
         slope_factor = 1.0 - (1.0 - p.slope_speed_factor) * min(slope / p.slow_slope, 1.0)
         # A robot that ran past the goal has no path left, but still a distance to drive back; the height of its frame
         # above the surface does not count.
-        left = max(tracker.to_cusp, math.hypot(*in_robot_frame(pose, target)[:2]))
+        left = tracker.to_cusp
+        if tracker.on_last_section:
+            left = max(left, math.hypot(*in_robot_frame(pose, target)[:2]))
         speed = min(
             p.max_vel_x * slope_factor,
             math.sqrt(p.max_lateral_acceleration / max(abs(curvature), 1e-6)),

@@ -17,6 +17,13 @@ SPEC.loader.exec_module(agreement)
 
 PLANNED = range(8)
 DRIVEN = {"costmap": [8, 16], "mesh": [1]}
+REFUSED = (
+    ("astar", "follow_path", 0), ("astar", "regulated_pure_pursuit", 0), ("dijkstra", "follow_path", 0),
+    ("theta_star", "follow_path", 0), ("astar", "follow_path", 6), ("hybrid_astar", "follow_path", 9),
+    ("hybrid_astar", "regulated_pure_pursuit", 9), ("theta_star", "follow_path", 15),
+    ("straight_line", "follow_path", 20), ("theta_star", "follow_path", 20), ("astar", "follow_path", 23),
+)  # fmt: skip
+"""Drives on the costmap that were refused twice at one place."""
 FOLLOWERS = {"regulated_pure_pursuit", "follow_path", "path_follower"}
 """Controllers that keep to their path; those that sample motions may leave it, and are only counted."""
 
@@ -30,6 +37,7 @@ def driven_pairs():
     for backend, seeds in DRIVEN.items():
         chosen = [pair for pair in agreement.pairs(backend) if pair[1] in FOLLOWERS]
         yield from ((backend, *pair, seed) for pair in chosen for seed in seeds)
+    yield from (("costmap", *drive) for drive in REFUSED)
 
 
 @pytest.mark.parametrize(("backend", "planner"), [pytest.param(*one, id=".".join(one)) for one in every_planner()])

@@ -18,7 +18,7 @@ from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.map_plugin import MapPlugin
-from mbf_abstract.maps.queries import PADDED, CellState
+from mbf_abstract.maps.queries import AS_CONFIGURED, CellState
 from mbf_abstract.maps.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
@@ -61,6 +61,7 @@ class FollowPathParameters(PluginParameters):
 
 
 MIN_SPEED = 0.05  # m/s; below it a robot would not reach the end of its path
+SHORTEST_CHECK = 0.05  # s
 
 
 class FollowPath(MapPlugin, AbstractController):
@@ -92,6 +93,10 @@ class FollowPath(MapPlugin, AbstractController):
         if tracker.deviation > farthest:
             text = f"{tracker.deviation:.2f} m off the path, limit {farthest:.2f} m"
             return ControlResult(ExePathOutcome.MISSED_PATH, text)
+
+        def blocked(motion: Twist) -> str:
+            return self.navigation_map.obstacle_ahead(there, motion, self._time_checked(motion, pose, tracker))
+
         try:
             there = self.on_map(pose)
             if self.navigation_map.point_check()(there).state is CellState.OUTSIDE:
@@ -102,7 +107,7 @@ class FollowPath(MapPlugin, AbstractController):
                 tracker.progress,
                 self._motions(pose, tracker),
                 p.make_room_dist,
-                lambda motion: self.navigation_map.obstacle_ahead(there, motion, p.check_ahead_time),
+                blocked,
                 lambda: self._along_path(pose, tracker, p.look_ahead_dist),
             )
         except TransformError as error:
@@ -124,9 +129,9 @@ class FollowPath(MapPlugin, AbstractController):
         After the wanted motion come those that make room for it.
         """
         p = self.parameters
-        gap, turn = self._from_goal(pose, tracker)
         backward = self._backward(tracker)
-        if tracker.on_last_section and tracker.remaining < 0.5 * MIN_SPEED and gap < MIN_SPEED:
+        gap, turn = self._from_goal(pose, tracker)
+        if self._is_at_end(pose, tracker):
             return [self._turn(turn)]
         bearing, curvature = self._carrot(pose, tracker)
         error = off_course(bearing, backward)
@@ -139,19 +144,43 @@ class FollowPath(MapPlugin, AbstractController):
         turn = max(-p.max_vel_theta, min(speed * curvature, p.max_vel_theta))
         return wider_curves(Twist.planar(vx=speed, wz=turn))
 
+    def _time_checked(self, motion: Twist, pose: Pose, tracker: PathTracker) -> float:
+        """How long [s] a motion must be free: until it ends at a cusp or has turned far enough, at most as set."""
+        left, speed = tracker.to_cusp, abs(motion.vx)
+        if motion.vx == 0.0:
+            left, speed = abs(self._angle_left(pose, tracker)), abs(motion.wz)
+        longest = self.parameters.check_ahead_time
+        return max(min(longest, left / speed), SHORTEST_CHECK) if speed > 0.0 else longest
+
     def _along_path(self, pose: Pose, tracker: PathTracker, reach: float) -> list[Twist]:
         """Motions that keep to the path, if the outline fits on it over ``reach`` [m]."""
-        backward, check = self._backward(tracker), self.navigation_map.pose_check(PADDED)
+        backward, check = self._backward(tracker), self.navigation_map.pose_check(AS_CONFIGURED)
         for x, y, yaw in poses_ahead(tracker, reach, backward).tolist():
             place = Pose.planar(x, y, yaw, pose.z, pose.frame_id, pose.stamp)
             if check(self.on_map(place)).state is CellState.LETHAL:
                 return []
-        error = off_course(self._carrot(pose, tracker)[0], backward)
+        error = self._angle_left(pose, tracker)
         return [*along_path(tracker, pose, backward), *([self._turn(error)] if abs(error) > SMALL_TURN else [])]
+
+    def _is_at_end(self, pose: Pose, tracker: PathTracker) -> bool:
+        """Whether nothing is left but to turn to the goal's heading."""
+        near = tracker.remaining < 0.5 * MIN_SPEED and self._from_goal(pose, tracker)[0] < MIN_SPEED
+        return tracker.on_last_section and near
+
+    def _angle_left(self, pose: Pose, tracker: PathTracker) -> float:
+        """Angle [rad] to the goal's heading at the end of the path, else to the point ahead on it."""
+        if self._is_at_end(pose, tracker):
+            return self._from_goal(pose, tracker)[1]
+        return off_course(self._carrot(pose, tracker)[0], self._backward(tracker))
 
     def _carrot(self, pose: Pose, tracker: PathTracker) -> tuple[float, float]:
         """Bearing [rad] of the point ahead on the path, and curvature [1/m] of the arc to it."""
-        x, y = tracker.point_at(min(tracker.progress + self.parameters.look_ahead_dist, tracker.next_cusp)).tolist()
+        p = self.parameters
+        if tracker.on_last_section:
+            point = tracker.point_at(tracker.progress + p.look_ahead_dist)
+        else:
+            point = tracker.straight_on(p.look_ahead_dist)
+        x, y = point.tolist()
         return arc_to(pose, np.array([x, y, pose.z]))
 
     def _backward(self, tracker: PathTracker) -> bool:

@@ -113,6 +113,29 @@ def test_the_poses_of_a_path_that_turns_back_do_not_make_it_one_for_reversing(sp
     assert tracker.cusps.tolist() == pytest.approx([5.0, 10.0])
 
 
+def turn_in_three_strokes():
+    """A short manoeuvre: 0.08 m back, 0.16 m ahead, then back; the robot looks along x all the time."""
+    points = np.array([[0.0, 0, 0], [-0.04, 0, 0], [-0.08, 0, 0], [0.0, 0.01, 0], [0.08, 0.02, 0], [-0.3, 0, 0]])
+    return Path(points, np.tile([0.0, 0.0, 0.0, 1.0], (len(points), 1)))
+
+
+def test_short_strokes_of_a_manoeuvre_are_not_skipped_while_the_robot_stands():
+    tracker = PathTracker(turn_in_three_strokes())
+    for _ in range(5):
+        tracker.update((0.0, 0.0, 0.0))
+    assert tracker.progress == pytest.approx(0.0, abs=0.01)
+    assert tracker.driving_backward and tracker.to_cusp == pytest.approx(0.08, abs=0.01)
+    walk(tracker, (0.0, 0.0), (-0.08, 0.0), step=0.01)
+    assert not tracker.driving_backward
+
+
+def test_past_a_cusp_and_past_the_end_a_path_is_taken_to_lead_straight_on():
+    tracker = PathTracker(path_through((0, 0), (2, 0), (0, 0.02), spacing=0.05))
+    tracker.update((1.7, 0.0, 0.0))
+    assert tracker.straight_on(0.2) == pytest.approx((1.9, 0.0, 0.0))
+    assert tracker.straight_on(0.7) == pytest.approx((2.4, 0.0, 0.0))
+
+
 def test_a_bend_and_a_right_angle_are_no_cusps_and_a_hairpin_is_one():
     angles = np.linspace(0.0, np.pi, 30)
     bend = 0.3 * np.column_stack([np.sin(angles), 1.0 - np.cos(angles), np.zeros(30)])

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_costmap_nav.controllers.dwa import DWAController
 from mbf_costmap_nav.controllers.mppi import MPPIController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.grid.motion_check import obstacle_ahead
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.grid.motion_check import blocked_cells, obstacle_ahead
 from mbf_costmap_nav.kernels.search.grid_search import search
 from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid, pad_cells
 from mbf_costmap_nav.planners.astar import AStarPlanner
@@ -21,7 +23,7 @@ from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
 from mbf_costmap_nav.planning.search_grid import traversal_table
 
 SQUARE = Footprint([[0.5, 0.5], [0.5, -0.5], [-0.5, -0.5], [-0.5, 0.5]])
-RESOLUTION = 0.01
+RESOLUTION, COARSE = 0.01, 0.05
 
 
 # ------------------------------------------------------------------------------------------------ collision monitor
@@ -70,6 +72,22 @@ def test_f154_what_lies_beyond_the_time_looked_ahead_is_no_obstacle_yet():
 def test_f155_one_point_is_an_obstacle():
     # Nav2 acts from a number of points on. Ours takes single points out of the map, by a denoise layer, or not at all.
     assert ahead(points_at((0.7, 0.0)), (0.5, 0.0), 1.0) != ""
+
+
+def test_where_planners_and_controllers_see_no_collision_a_motion_is_free():
+    rng, refused, clipped = np.random.default_rng(0), 0, 0
+    check = FootprintCheck(SQUARE, COARSE)
+    for _ in range(300):
+        cells = np.where(rng.random((80, 80)) < 0.004, 254, 0).astype(np.uint8)
+        costmap, yaw = Costmap(cells, COARSE, -2.0, -2.0), rng.uniform(-math.pi, math.pi)
+        if blocked_cells(costmap, SQUARE, 0.0, 0.0, yaw)[0]:
+            continue
+        poses = arc_poses((0.0, 0.0, yaw), 0.5, 0.0, 0.0, 0.4, 0.05)
+        obstacle = obstacle_ahead(costmap, SQUARE, Pose.planar(0.0, 0.0, yaw), Twist.planar(0.5), 0.4)
+        assert bool(obstacle) == (check.first_collision(costmap, poses) >= 0)
+        refused += bool(obstacle)
+        clipped += not obstacle and any(blocked_cells(costmap, SQUARE, *pose)[0] for pose in poses.tolist())
+    assert refused > 0 and clipped > 0  # by less than a quarter of a cell, which counts for none of them
 
 
 # ------------------------------------------------------------------------------------------------ velocity smoother
