@@ -77,8 +77,8 @@ def test_f155_one_point_is_an_obstacle():
 def test_where_planners_and_controllers_see_no_collision_a_motion_is_free():
     rng, refused, clipped = np.random.default_rng(0), 0, 0
     check = FootprintCheck(SQUARE, COARSE)
-    for _ in range(300):
-        cells = np.where(rng.random((80, 80)) < 0.004, 254, 0).astype(np.uint8)
+    for _ in range(400):
+        cells = np.where(rng.random((80, 80)) < 0.001, 254, 0).astype(np.uint8)
         costmap, yaw = Costmap(cells, COARSE, -2.0, -2.0), rng.uniform(-math.pi, math.pi)
         if blocked_cells(costmap, SQUARE, 0.0, 0.0, yaw)[0]:
             continue
