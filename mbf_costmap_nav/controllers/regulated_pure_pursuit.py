@@ -18,7 +18,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Path, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_poses
-from mbf_abstract.maps.room_to_turn import (
+from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
     along_path,

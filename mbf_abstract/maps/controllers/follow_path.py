@@ -17,9 +17,7 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.maps.map_plugin import MapPlugin
-from mbf_abstract.maps.queries import AS_CONFIGURED, CellState
-from mbf_abstract.maps.room_to_turn import (
+from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
     along_path,
@@ -28,6 +26,8 @@ from mbf_abstract.maps.room_to_turn import (
     poses_ahead,
     wider_curves,
 )
+from mbf_abstract.maps.map_plugin import MapPlugin
+from mbf_abstract.maps.queries import AS_CONFIGURED, CellState
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult

@@ -7,7 +7,7 @@ import pytest
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
-from mbf_abstract.maps.room_to_turn import (
+from mbf_abstract.maps.controllers.room_to_turn import (
     AHEAD,
     CREEPING,
     RoomToTurn,
