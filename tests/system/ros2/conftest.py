@@ -1,6 +1,7 @@
 """Real nodes of ROS 2 in processes of their own."""
 
 import json
+import signal
 import subprocess
 import threading
 from contextlib import ExitStack
@@ -28,6 +29,12 @@ recovery_behaviors: [{name: pause, type: wait}]
 )
 
 
+def start_as_from_a_terminal():
+    """In a new process: it ends with this one, and SIGHUP is not ignored, also where the tests run under nohup."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    end_with_parent()
+
+
 class Peer:
     """A process that writes JSON, one value a line, and takes orders on its standard input; its log is in ``logs``."""
 
@@ -42,7 +49,7 @@ class Peer:
             stdout=subprocess.PIPE,
             stderr=self._log,
             text=True,
-            preexec_fn=end_with_parent,
+            preexec_fn=start_as_from_a_terminal,
         )
         self.lines = []
         self._condition = threading.Condition()
