@@ -72,21 +72,21 @@ def test_all_unknown_inputs_are_named():
         dependency_order({"a": ["x"], "b": ["y", "a"]})
 
 
-def test_a_circle_is_named_beside_unknown_inputs():
-    with pytest.raises(LayerListError, match=r"a reads unknown layer 'x'.*circle: b -> c -> b"):
+def test_a_cycle_is_named_beside_unknown_inputs():
+    with pytest.raises(LayerListError, match=r"a reads unknown layer 'x'.*cycle: b -> c -> b"):
         dependency_order({"a": ["x"], "b": ["c"], "c": ["b", "a"]})
 
 
 @pytest.mark.parametrize(
-    ("inputs", "circle"),
+    ("inputs", "cycle"),
     [
         ({"a": ["a"]}, "a -> a"),
         ({"a": ["b"], "b": ["c"], "c": ["b"], "d": []}, "b -> c -> b"),
         ({"end": ["a"], "a": ["b", "d"], "b": ["a"], "d": []}, "a -> b -> a"),
     ],
 )
-def test_circle_is_refused_and_spelled_out(inputs, circle):
-    with pytest.raises(LayerListError, match=circle):
+def test_cycle_is_refused_and_spelled_out(inputs, cycle):
+    with pytest.raises(LayerListError, match=cycle):
         dependency_order(inputs)
 
 
