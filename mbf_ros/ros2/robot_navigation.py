@@ -26,7 +26,7 @@ from mbf_ros.ros2.clock import RosClock
 from mbf_ros.ros2.robot import Arrivals, Frames, RosRobot
 
 COMPILING = "compiling kernels"
-WATCH_PERIOD = 0.05  # s of real time between two looks at what fails to come
+WATCH_PERIOD = 0.02  # s of real time between two looks at what fails to come: less than a control period
 
 
 class Commands(Protocol):

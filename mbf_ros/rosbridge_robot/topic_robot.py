@@ -20,7 +20,7 @@ from mbf_ros.ros2.robot import Arrivals, Frames, RosRobot
 from mbf_ros.rosbridge.protocol import absolute
 from mbf_ros.rosbridge.topics import TopicTable
 
-WATCH_PERIOD = 0.05  # s between two looks at what fails to come
+WATCH_PERIOD = 0.02  # s between two looks at what fails to come: less than a control period
 
 
 class TopicRobot:

@@ -117,10 +117,10 @@ class Robot(Peer):
         return next((line["x"] for line in reversed(self.lines) if "x" in line), 0.0)
 
     def set(self, topic, value):
-        """Silence a topic ("off"), let it speak ("on"), or set simulated time."""
+        """Silence a topic ("off"), let it speak ("on"), or set simulated time; returns what it says then."""
         since = len(self.lines)
         self.order(f"{topic} {value}")
-        self.wait_for(lambda line: line.get("done") == f"{topic} {value}", since)
+        return self.wait_for(lambda line: line.get("done") == f"{topic} {value}", since)
 
     def wait_until_last_speed_is_zero(self):
         """Wait until it was stopped; one that has never been moved gets no command to stop, either."""

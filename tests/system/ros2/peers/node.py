@@ -1,10 +1,12 @@
 """Our node as ``mbf ros2 CONFIG`` runs it, with time to end on a slow machine, and faults of ours that tests wake.
 
-A message on ``fail`` makes a callback raise, the cancelling of an exe_path goal its coroutine, and a first message on
-``/clock`` that is before ``EPOCH`` the callback that takes it.
+A message on ``fail`` makes a callback raise, one on ``hang`` makes a callback wait for ever, the cancelling of an
+exe_path goal makes its coroutine raise, and a first message on ``/clock`` that is before ``EPOCH`` the callback that
+takes it.
 """
 
 import sys
+import threading
 from dataclasses import replace
 from functools import partial
 
@@ -23,9 +25,13 @@ class Inputs(node.Inputs):
     def __init__(self, robot):
         super().__init__(robot)
         self._node.create_subscription(Empty, "fail", self.fail, 10)
+        self._node.create_subscription(Empty, "hang", self.hang, 10)
 
     def fail(self, message):
         raise FAULT
+
+    def hang(self, message):
+        threading.Event().wait()
 
 
 class Clock(node.SimulatedRosClock):

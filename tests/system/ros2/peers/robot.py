@@ -1,9 +1,10 @@
 """A robot as a node of ROS 2: it drives as cmd_vel says and publishes tf, odometry and a scan, and a log on stdout.
 
 It stops by itself when no command has come for ``COMMAND_TIMEOUT``. It takes orders on stdin, one a line: the name
-of a topic and "off" or "on" silences it, "clock 12.5" sets simulated time, "fail now" publishes on ``fail``. Each line
-of the log is JSON: an order that was done, a command that came, as its speed and where the robot was, or where it
-stopped by itself.
+of a topic and "off" or "on" silences it, "clock 12.5" sets simulated time, "fail now" and "hang now" publish on
+``fail`` and ``hang``. Each line of the log is JSON with ``at``, the time of this computer [s]: an order that was done,
+with the time at which its topic was last published; a command that came, as its speed and where the robot was; or where
+it stopped by itself.
 """
 
 import json
@@ -11,6 +12,7 @@ import math
 import sys
 import threading
 import time
+from collections import deque
 
 import rclpy
 from geometry_msgs.msg import TransformStamped, Twist
@@ -22,7 +24,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Empty
 from tf2_msgs.msg import TFMessage
 
-PERIOD, COMMAND_TIMEOUT = 0.1, 1.0  # s; oftener, a node on a busy machine would hear it seconds late
+PERIOD, COMMAND_TIMEOUT = 0.1, 3.0  # s; oftener, a node on a busy machine would hear it seconds late
 
 
 class Robot(Node):
@@ -31,12 +33,12 @@ class Robot(Node):
         self.x = self.y = self.yaw = 0.0
         self.time = 1000.0
         self.simulated, self.command, self.commanded = simulated, Twist(), 0.0
-        self.silent = set()
+        self.silent, self.published, self.orders = set(), {}, deque()
         self.tf = self.create_publisher(TFMessage, "/tf", 100)
         self.odom = self.create_publisher(Odometry, "odom", 10)
         self.scan = self.create_publisher(LaserScan, "scan", qos_profile_sensor_data)
         self.clock = self.create_publisher(Clock, "/clock", 10)
-        self.fail = self.create_publisher(Empty, "fail", 10)
+        self.faults = {name: self.create_publisher(Empty, name, 10) for name in ("fail", "hang")}
         self.create_subscription(Twist, "cmd_vel", self.take, 10)
         self.create_timer(PERIOD, self.step)
 
@@ -45,7 +47,7 @@ class Robot(Node):
         self.log(speed=math.hypot(message.linear.x, message.linear.y) + abs(message.angular.z), x=self.x)
 
     def log(self, **fields):
-        sys.stdout.write(json.dumps(fields) + "\n")
+        sys.stdout.write(json.dumps({**fields, "at": time.monotonic()}) + "\n")
         sys.stdout.flush()
 
     def stamp(self):
@@ -56,6 +58,8 @@ class Robot(Node):
         return stamp
 
     def step(self):
+        while self.orders:
+            self.obey(self.orders.popleft())
         if self.command != Twist() and time.monotonic() - self.commanded > COMMAND_TIMEOUT:
             self.command = Twist()
             self.log(stood=True, x=self.x)
@@ -64,14 +68,16 @@ class Robot(Node):
         self.x += speed * math.cos(self.yaw) * PERIOD
         self.y += speed * math.sin(self.yaw) * PERIOD
         self.time += PERIOD
-        if self.simulated and "clock" not in self.silent:
-            self.clock.publish(Clock(clock=self.stamp()))
-        if "tf" not in self.silent:
-            self.tf.publish(TFMessage(transforms=[self.transform()]))
-        if "odom" not in self.silent:
-            self.odom.publish(self.odometry())
-        if "scan" not in self.silent:
-            self.scan.publish(self.scan_of_a_wall())
+        if self.simulated:
+            self.say("clock", self.clock, lambda: Clock(clock=self.stamp()))
+        self.say("tf", self.tf, lambda: TFMessage(transforms=[self.transform()]))
+        self.say("odom", self.odom, self.odometry)
+        self.say("scan", self.scan, self.scan_of_a_wall)
+
+    def say(self, topic, publisher, message):
+        if topic not in self.silent:
+            publisher.publish(message())
+            self.published[topic] = time.monotonic()
 
     def transform(self):
         transform = TransformStamped(child_frame_id="base_link")
@@ -93,16 +99,19 @@ class Robot(Node):
         scan.ranges = [4.0] * 4  # a wall on its left
         return scan
 
+    def obey(self, order):
+        topic, value = order.split()
+        if value in ("on", "off"):
+            (self.silent.add if value == "off" else self.silent.discard)(topic)
+        elif topic in self.faults:
+            self.faults[topic].publish(Empty())
+        else:
+            self.time = float(value)
+        self.log(done=order, last=self.published.get(topic))
+
     def listen(self):
         for line in sys.stdin:
-            topic, value = line.split()
-            if value in ("on", "off"):
-                (self.silent.add if value == "off" else self.silent.discard)(topic)
-            elif topic == "fail":
-                self.fail.publish(Empty())
-            else:
-                self.time = float(value)
-            self.log(done=line.strip())
+            self.orders.append(line.strip())
 
 
 rclpy.init()
