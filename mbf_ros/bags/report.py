@@ -47,8 +47,9 @@ def result_line(replayed: Replayed) -> str:
     if replayed.plan is None:
         return line
     plan = replayed.plan
-    length = "" if plan["length_m"] is None else f", {plan['length_m']:.2f} m"
-    return f"{line}; plan at {plan['at_s']:.1f} s: {plan['outcome_name']}{length}: {plan['message']}"
+    length = "" if plan["length_m"] is None else f"{plan['length_m']:.2f} m"
+    shown = f", {length}" if length not in plan["message"] else ""  # some planners' messages name it
+    return f"{line}; plan at {plan['at_s']:.1f} s: {plan['outcome_name']}{shown}: {plan['message']}"
 
 
 def _notes(replayed: Replayed) -> Iterator[str]:

@@ -134,6 +134,7 @@ def read_parts(folder: Path) -> Recording:
             grids=_joined(parts, "grids"),
             meshes=_with_surface(_joined(parts, "meshes")),
             layers=_joined(parts, "layers"),
+            objects=_joined(parts, "objects"),
             actors=[
                 replace(track, poses=np.concatenate([part.actors[number].poses for part in parts]))
                 for number, track in enumerate(parts[0].actors)

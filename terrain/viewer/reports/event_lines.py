@@ -35,14 +35,17 @@ REPLACED = "preempted by a new plan"  # message of exe_path's goal when the robo
 
 
 def event_text(event: Event) -> str:
-    """Return what an event says: its sentence where it has one, and the rest of its data as ``key: value`` pairs."""
+    """Return what an event says: its sentence where it has one, and the rest of its data as ``key: value`` pairs.
+
+    The pairs are sorted, for a recording that was saved and read again has the fields of its events sorted.
+    """
     if event.kind is EventKind.INCIDENT:
         return _incident_text(event.data)
     data = {key: value for key, value in event.data.items() if key not in LEFT_OUT}
     if event.kind in WHOLE:
         return str(data.get(WHOLE[event.kind], ""))
     sentence = next((str(data.pop(key)) for key in SENTENCES if data.get(key)), "")
-    pairs = ", ".join(f"{key}: {value}" for key, value in data.items() if value != "")
+    pairs = ", ".join(f"{key}: {value}" for key, value in sorted(data.items()) if value != "")
     return f"{sentence} ({pairs})" if sentence and pairs else sentence or pairs
 
 

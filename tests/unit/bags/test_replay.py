@@ -1,6 +1,7 @@
 """A bag goes through our transform buffer and layers at the recorded stamps."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -169,6 +170,7 @@ def test_the_command_writes_the_same_bytes_twice(tmp_path, configuration):
         result = CliRunner().invoke(make_app(), [str(one) for one in arguments])
         assert result.exit_code == 0, result.output
         assert "plan at 0.5 s: SUCCESS" in result.output
+        assert len(re.findall(r"\d\.\d\d m\b", result.output)) == 1, "the length of the plan is said once"
     written = sorted(file.name for file in (tmp_path / "first").iterdir())
     assert written == [
         *("map_00000.9s.png", "map_00001.0s.png", "plan.json", "report.html", "run.mcap"),

@@ -19,7 +19,7 @@ from terrain.physics.robot_models import HUSKY
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorded_objects import RecordedObjects
 from terrain.recording.recorder import MAP_PERIOD, Recorder
-from terrain.recording.recording import RobotShape
+from terrain.recording.recording import Recording, RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.session.session import Session
 from terrain.viewer.logs.foxglove_messages import MAP_LIFT, nanoseconds, triangles
@@ -280,6 +280,17 @@ def test_a_run_that_never_began_has_a_log_too(tmp_path):
 def test_the_same_recording_gives_the_same_bytes(office, tmp_path):
     for name in ("first.mcap", "second.mcap"):
         write_mcap(tmp_path / name, office)
+
+    assert (tmp_path / "first.mcap").read_bytes() == (tmp_path / "second.mcap").read_bytes()
+
+
+def test_a_recording_that_was_read_again_gives_the_same_bytes(office, tmp_path):
+    """At the end of a run the fields of its events stand as they came, and sorted when they were read from the file."""
+    event = Event(0.1, EventKind.GOAL_STARTED, "get_path", {"slot": 255, "goal_id": 1, "plugin": "theta_star"})
+    run = replace(office, events=(event, *office.events))
+    run.save(tmp_path / "recording.npz")
+    write_mcap(tmp_path / "first.mcap", run)
+    write_mcap(tmp_path / "second.mcap", Recording.load(tmp_path / "recording.npz"))
 
     assert (tmp_path / "first.mcap").read_bytes() == (tmp_path / "second.mcap").read_bytes()
 

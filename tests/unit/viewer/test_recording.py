@@ -16,6 +16,7 @@ from terrain.physics.robot_models import CAR, HUSKY, TURTLEBOT
 from terrain.recording.recorded_objects import AGE, IS_MOVING, NUMBER, VX, X, Y
 from terrain.recording.recorder import MAP_PERIOD, MAX_GRID_CELLS, MAX_MESH_VERTICES, OBJECTS_PERIOD, Recorder
 from terrain.recording.recording import Recording, RecordingError, RobotShape
+from terrain.recording.run_folder import PARTS, read_parts
 from terrain.recording.verdict import Verdict
 from terrain.scenarios.scenario import load_scenario
 from terrain.session.session import Session, SessionOptions
@@ -237,6 +238,16 @@ def test_parts_of_a_recording_have_their_own_objects():
     assert len(recorder.take().objects) == 1
     recorder.tracked(1.0, lambda: [tracked(1, 1.5, 0.5)])
     assert [one.time for one in recorder.take().objects] == [1.0]
+
+
+def test_the_joined_parts_of_a_run_have_the_objects_of_all(tmp_path):
+    recorder = Recorder("street", "mesh", RobotShape.of(HUSKY), Pose.planar(0.0, 0.0), [])
+    (tmp_path / PARTS).mkdir()
+    for part in range(3):
+        recorder.tracked(float(part), lambda: [tracked(1, 1.0, 0.5)])
+        recorder.take().save(tmp_path / PARTS / f"{part:06d}.npz")
+
+    assert [one.time for one in read_parts(tmp_path).objects] == [0.0, 1.0, 2.0]
 
 
 def test_events_of_a_real_clock_are_brought_to_the_time_of_the_samples():

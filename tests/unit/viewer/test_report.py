@@ -37,6 +37,10 @@ def test_the_report_is_one_file_without_script_and_links(hill_recording):
     assert len(page) < 3e6
 
 
+def test_the_same_run_has_the_same_report_every_time(hill_recording):
+    assert report_of(hill_recording) == report_of(hill_recording)
+
+
 def test_texts_of_a_run_cannot_break_the_page(hill_recording):
     evil = replace(hill_recording, verdict=Verdict(0, "<script>alert(1)</script>"), scenario="<b>")
 
