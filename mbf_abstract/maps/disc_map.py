@@ -14,6 +14,7 @@ import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.controllers.failures import obstacle_text
 from mbf_abstract.maps.navigation_map import NavigationMap, PlaceCheck
 from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery, PoseAnswer
 
@@ -54,13 +55,17 @@ class DiscMap(NavigationMap):
         return lambda pose: self.place(pose.x, pose.y)
 
     def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
-        """State and cost of the disc: LETHAL where it touches something."""
+        """State and cost of the disc: LETHAL where it touches something, INSCRIBED where it covers such a centre."""
         if center_only:
             return self.point_check()
 
         def check(pose: Pose) -> PlaceAnswer:
             answer = self.place(pose.x, pose.y, query.safety_dist)
-            return replace(answer, state=CellState.LETHAL) if answer.state is CellState.INSCRIBED else answer
+            if answer.state is CellState.INSCRIBED:
+                return replace(answer, state=CellState.LETHAL)
+            around = self.place(pose.x, pose.y, query.safety_dist + self.robot_radius)
+            is_near = answer.state is CellState.FREE and around.state is CellState.INSCRIBED
+            return replace(answer, state=CellState.INSCRIBED) if is_near else answer
 
         return check
 
@@ -94,7 +99,7 @@ class DiscMap(NavigationMap):
         for x, y, _ in ahead.tolist():
             clearance = self.clearance(x, y)
             if clearance < self.robot_radius and clearance < before:
-                return f"an obstacle is in the way: the robot would touch it at ({x:.2f}, {y:.2f})"
+                return obstacle_text(f"({x:.2f}, {y:.2f})")
             before = clearance
         return ""
 

@@ -16,6 +16,7 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, normalize_angle
 from mbf_abstract.geometry.arithmetic import plane_rotation, rotated_back
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.maps.controllers.failures import no_path, outside_map
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_costmap_nav.grid.costmap import Costmap
@@ -102,7 +103,7 @@ class PathFollower(CostmapController):
     def begin_cycle(self, request: ControlRequest) -> ControlCycle | ControlResult:
         """Update the progress and check what every controller needs; a result is the failure to hand on."""
         if self.tracker is None:
-            return ControlResult(ExePathOutcome.INVALID_PATH, "no path has been set")
+            return no_path()
         try:
             request, tracker, limit = self._on_costmap(request, self.tracker)
         except TransformError as error:
@@ -111,7 +112,7 @@ class PathFollower(CostmapController):
             return ControlResult(ExePathOutcome.MAP_ERROR, problem)  # the server looks at the local map only
         pose, costmap = request.pose, self.costmap.snapshot()
         if not costmap.contains(pose.x, pose.y):
-            return ControlResult(ExePathOutcome.OUT_OF_MAP, f"robot ({pose.x:.2f}, {pose.y:.2f}) is outside {costmap}")
+            return outside_map(f"({pose.x:.2f}, {pose.y:.2f})", str(costmap))
         footprint = self.checked_footprint()
         if self._footprint is None or self._footprint.footprint is not footprint:
             self._footprint = FootprintCheck(footprint, costmap.resolution)

@@ -18,6 +18,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Path, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.controllers.failures import missed_path, obstacle_text
 from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
@@ -160,11 +161,8 @@ class RegulatedPurePursuitController(PathFollower):
         cycle = self.begin_cycle(request)
         if isinstance(cycle, ControlResult):
             return cycle
-        tracker = cycle.tracker
-        furthest = self.parameters.max_path_distance * cycle.limit_factor
-        if tracker.deviation > furthest:
-            text = f"{tracker.deviation:.2f} m off the path, limit {furthest:.2f} m"
-            return ControlResult(ExePathOutcome.MISSED_PATH, text)
+        if missed := missed_path(cycle.tracker, self.parameters.max_path_distance * cycle.limit_factor):
+            return missed
         return self._checked(cycle, self._motions(cycle))
 
     def _motions(self, cycle: ControlCycle) -> list[Twist]:
@@ -310,4 +308,4 @@ class RegulatedPurePursuitController(PathFollower):
         if hit < 0:
             return ""
         x, y = poses[hit, 0], poses[hit, 1]
-        return f"obstacle ahead: the footprint would collide at ({x:.2f}, {y:.2f}) in {(hit + 1) * step:.2f} s"
+        return obstacle_text(f"({x:.2f}, {y:.2f}) in {(hit + 1) * step:.2f} s")

@@ -18,6 +18,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.controllers.failures import obstacle_text
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
@@ -53,7 +54,7 @@ def obstacle_ahead(
         blocked, covered = blocked_cells(costmap, footprint, x, y, yaw)
         deeper = blocked > allowed and (allowed > 0 or _collides(costmap, footprint, x, y, yaw))
         if deeper or (blocked == covered and not leaves_collisions):
-            return f"an obstacle is in the way: the footprint would touch it at ({x:.2f}, {y:.2f}, {yaw:.2f} rad)"
+            return obstacle_text(f"({x:.2f}, {y:.2f}, {yaw:.2f} rad)")
     return ""
 
 

@@ -34,7 +34,6 @@ class DenoiseLayer(CostmapLayer):
     """Frees small groups. See the module's text for when to use it."""
 
     Parameters = DenoiseLayerParameters
-    clearable = False
     parameters: DenoiseLayerParameters
 
     def match_geometry(self, geometry: GridGeometry) -> None:

@@ -42,7 +42,6 @@ class InflationLayer(CostmapLayer):
     """Distance costs around lethal cells. See the module's text for when to use it."""
 
     Parameters = InflationLayerParameters
-    clearable = False
     parameters: InflationLayerParameters
 
     def __init__(self, context: LayerContext) -> None:

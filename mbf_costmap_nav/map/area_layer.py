@@ -36,7 +36,6 @@ class AreaLayer(CostmapLayer):
         Where zones and mask lie on the costmap.
     """
 
-    clearable = False
     parameters: AreaLayerParameters
 
     def __init__(self, context: LayerContext) -> None:

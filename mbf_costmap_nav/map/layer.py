@@ -87,7 +87,7 @@ class CostmapLayer(MapLayer):
 
     contract_check: ClassVar[str] = "mbf_costmap_nav.testing:check_layer"
     clearable: ClassVar[bool] = True
-    """Whether it is cleared with an area if no layers are named; false for what no sensor brings back."""
+    """Whether clearing names it, and takes an area out of it, if no layers are named; false for a floor plan."""
     geometry: GridGeometry
 
     def __init__(self, context: LayerContext) -> None:
@@ -154,6 +154,11 @@ class CostmapLayer(MapLayer):
     @abstractmethod
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
         """Write this layer's costs into ``cells[box.slices]``; ``box`` lies on the grid."""
+
+    @property
+    def forgets(self) -> bool:
+        """Whether ``reset`` is its own."""
+        return type(self).reset is not CostmapLayer.reset
 
     def reset(self) -> None:
         """Forget everything the layer has gathered; a static layer returns to its map."""

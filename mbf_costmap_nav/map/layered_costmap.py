@@ -306,16 +306,16 @@ class LayeredCostmap(SnapshotAnswers):
 
     # ----------------------------------------------------------------------------------------------- clearing
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
-        """Reset layers (all by default) to what they know without sensors; return their names.
+        """Reset layers (all by default) to what they know without sensors.
 
-        The effect is visible after the next update. Raises KeyError where a name is no layer.
+        The effect is visible after the next update. Returned are the names of the layers that hold what is sensed, and
+        of a floor plan where it is asked for. Raises KeyError where a name is no layer.
         """
         with self._lock:
-            chosen = self.layers.chosen(layer_names)
-            for layer in chosen:
+            for layer in self.layers.chosen(layer_names):
                 layer.reset()
             self._window.recompute_all()
-        return [layer.name for layer in chosen]
+            return [layer.name for layer in self._clearable(layer_names)]
 
     def clear_area(
         self, center: Pose, size: float, layer_names: Iterable[str] | None = None, *, inside: bool = True
@@ -326,8 +326,7 @@ class LayeredCostmap(SnapshotAnswers):
         static layer that is named loses the area until ``clear``. Raises KeyError where a name is no layer.
         """
         with self._lock:
-            clearable = [name for name, layer in self.layers.items() if layer.clearable]
-            chosen = self.layers.chosen(clearable if layer_names is None else layer_names)
+            chosen = self._clearable(layer_names)
             x0, y0 = self.geometry.world_to_cell_unbounded(center.x - size / 2, center.y - size / 2)
             x1, y1 = self.geometry.world_to_cell_unbounded(center.x + size / 2, center.y + size / 2)
             window = CellBox(x0 + 1, y0 + 1, x1, y1)  # costmap_2d's window leaves out its border cells
@@ -335,3 +334,8 @@ class LayeredCostmap(SnapshotAnswers):
                 layer.clear_area(window, inside)
             self._window.recompute_all()
         return [layer.name for layer in chosen]
+
+    def _clearable(self, layer_names: Iterable[str] | None) -> list[CostmapLayer]:
+        """Layers of some names that forget when they are cleared; by default without the floor plans."""
+        forgetting = self.layers.forgetting(layer_names)
+        return [layer for layer in forgetting if layer.clearable or layer_names is not None]

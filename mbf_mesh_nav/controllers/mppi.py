@@ -23,6 +23,7 @@ from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import exp, norm, tan
 from mbf_abstract.geometry.polyline import reverse_segments
 from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
+from mbf_abstract.maps.controllers.failures import missed_path
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, Encounters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -33,7 +34,7 @@ from mbf_mesh_nav.kernels.motion.mppi import score_rollouts
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.positions import vector_of
-from mbf_mesh_nav.motion.goal_approach import GoalApproach, braking_speed, clamp, missed_path, tracker_on_surface
+from mbf_mesh_nav.motion.goal_approach import GoalApproach, braking_speed, clamp, tracker_on_surface
 from mbf_mesh_nav.motion.surface_follower import SurfaceFollower
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.search.final_approach import with_final_approach, with_first_turn

@@ -17,13 +17,15 @@ import numpy as np
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to, in_robot_frame
 from mbf_abstract.geometry.tangent_plane import heading_error
+from mbf_abstract.maps.controllers.failures import missed_path, obstacle_text
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter
 from mbf_mesh_nav.mesh.borders import beyond_border
-from mbf_mesh_nav.motion.goal_approach import GoalApproach, braking_speed, clamp, missed_path, tracker_on_surface
+from mbf_mesh_nav.mesh.positions import position_text
+from mbf_mesh_nav.motion.goal_approach import GoalApproach, braking_speed, clamp, tracker_on_surface
 from mbf_mesh_nav.motion.surface_follower import SurfaceFollower
 
 OBSTACLE_STEP = 0.1  # m between two looks along the path
@@ -99,14 +101,13 @@ class PathFollower(SurfaceFollower):
         if approach.is_only_turning(pose, self._tracker):
             turn = self.parameters.turn_gain * heading_error(pose, approach.goal)
             return self._command(0.0, turn)
-        blocked_in = self._distance_to_obstacle(surface.point)
-        if blocked_in is not None:
-            return ControlResult(ExePathOutcome.BLOCKED_PATH, f"the path is blocked {blocked_in:.2f} m ahead")
+        if obstacle := self._obstacle_on_path(surface.point):
+            return ControlResult(ExePathOutcome.BLOCKED_PATH, obstacle)
         slope = math.acos(clamp(float(self.mesh_map.face_normals[surface.face, 2]), 1.0))
         return self._pursue(pose, slope)
 
-    def _distance_to_obstacle(self, here: FloatArray) -> float | None:
-        """Distance [m] along the path to the first place that the map forbids now; None without one in reach.
+    def _obstacle_on_path(self, here: FloatArray) -> str:
+        """The first place on the path that the map forbids now, as a text; empty without one in reach.
 
         A robot that stands on forbidden surface may leave it, see ``kernels.search.forbidden_surface``. Where the path
         leads off the surface it is blocked too.
@@ -119,10 +120,10 @@ class PathFollower(SurfaceFollower):
         nearest = np.take_along_axis(ranks, np.argmax(location.barycentric, axis=1)[:, None], axis=1)[:, 0]
         mixed = np.where(nearest > 0.0, (ranks * location.barycentric).sum(axis=1), 0.0)
         mixed[(location.faces < 0) | beyond_border(self.mesh_map.topology, places, location)] = LETHAL_RANK
-        for distance, before, now in zip(ahead, mixed[:-1], mixed[1:], strict=True):
+        for place, before, now in zip(places[1:], mixed[:-1], mixed[1:], strict=True):
             if not may_enter(before, now):
-                return float(distance)
-        return None
+                return obstacle_text(position_text(place))
+        return ""
 
     def _pursue(self, pose: Pose, slope: float) -> ControlResult:
         """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""

@@ -89,7 +89,7 @@ class VectorFieldController(SurfaceFollower):
             return self._command(0.0, self._turn_rate(heading_error(pose, approach.goal)))
         direction = self._fields[self._leg].direction_at(self.mesh_map, spot)
         if direction is None:
-            return ControlResult(ExePathOutcome.MISSED_PATH, "the field does not lead on from here; plan again")
+            return ControlResult(ExePathOutcome.MISSED_PATH, "the vector field does not lead on from here")
         ahead = rotated_back(pose.rotation, direction)
         return self._steer(math.atan2(ahead[1], ahead[0]), ground_distance(pose, approach.goal))
 

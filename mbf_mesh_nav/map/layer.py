@@ -155,6 +155,11 @@ class MeshLayer(map_layer.MapLayer):
         """Take in the scans since the last update, forget what is too old at ``now`` [s]; return what changed."""
         return NOTHING_CHANGED
 
+    @property
+    def forgets(self) -> bool:
+        """Whether ``clear`` is its own."""
+        return type(self).clear is not MeshLayer.clear
+
     def clear(self) -> IntArray:
         """Forget everything sensed."""
         return NOTHING_CHANGED

@@ -227,7 +227,7 @@ class MeshMap(SnapshotAnswers):
 
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
         """Forget all sensed obstacles, or those in some layers, at once; return the names of the layers."""
-        chosen = self._sensing(layer_names)
+        chosen = [layer.name for layer in self.layers.forgetting(layer_names)]
         self.apply(lambda layer: layer.clear() if layer.name in chosen else NOTHING_CHANGED)
         return chosen
 
@@ -235,19 +235,13 @@ class MeshMap(SnapshotAnswers):
         self, center: Pose, size: float, layer_names: Iterable[str] | None = None, *, inside: bool = True
     ) -> list[str]:
         """Forget obstacles sensed inside, or outside, a square of side ``size`` [m] around a pose, as ``clear``."""
-        chosen, middle = self._sensing(layer_names), np.asarray(center.position)
+        chosen, middle = [layer.name for layer in self.layers.forgetting(layer_names)], np.asarray(center.position)
 
         def forget(layer: MeshLayer) -> IntArray:
             return layer.clear_area(middle, size, inside) if layer.name in chosen else NOTHING_CHANGED
 
         self.apply(forget)
         return chosen
-
-    def _sensing(self, layer_names: Iterable[str] | None) -> list[str]:
-        """Names of the given layers, or of all that forget when they are cleared; KeyError if one is no layer."""
-        if layer_names is not None:
-            return [layer.name for layer in self.layers.chosen(layer_names)]
-        return [name for name, layer in self.layers.items() if type(layer).clear is not MeshLayer.clear]
 
     def take_parameters(self, parameters: Any) -> None:
         """Take over ``edge_cost_factor``, ``inscribed_radius`` and ``footprint`` of ``MeshMapParameters``."""

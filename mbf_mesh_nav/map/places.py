@@ -5,7 +5,7 @@ are the vertices below it that are connected to the place it stands on, so the s
 
 - OUTSIDE: no surface within ``SURFACE_DISTANCE`` above or below the position, or past a border.
 - LETHAL: the disc (of a point: the nearest vertex) touches a lethal vertex or one whose cost is infinite or NaN.
-- INSCRIBED: of a point only: a robot standing there would touch one.
+- INSCRIBED: a robot whose centre is at the point, or somewhere below the disc, would touch one.
 
 Deviation from the costmap's answers: a disc has no heading, hence ``angle_tolerance`` never matters.
 """
@@ -55,14 +55,21 @@ class MeshPlaces:
         return PlaceAnswer(CellState.INSCRIBED if touched else CellState.FREE, cost)
 
     def check_pose(self, pose: Pose, query: PlaceQuery) -> PlaceAnswer:
-        """State of the robot's disc at a pose and the sum of the costs of the vertices below it."""
+        """State of the robot's disc at a pose and the sum of the costs of the vertices below it.
+
+        It covers an inscribed place where something lethal is within its radius and the inscribed one.
+        """
         place = self._on_surface(pose)
         if place is None:
             return OUTSIDE
         vertices = self._disc(place, self.inscribed_radius + query.safety_dist)
         blocked, costs = self._blocked(vertices), self.snapshot.costs[vertices]
         costs = np.where(blocked, costs * query.lethal_cost_mult, costs)
-        return PlaceAnswer(CellState.LETHAL if blocked.any() else CellState.FREE, float(costs.sum()))
+        if blocked.any():
+            return PlaceAnswer(CellState.LETHAL, float(costs.sum()))
+        around = self._disc(place, 2.0 * self.inscribed_radius + query.safety_dist)
+        state = CellState.INSCRIBED if self._blocked(around).any() else CellState.FREE
+        return PlaceAnswer(state, float(costs.sum()))
 
     def find_valid_pose(self, pose: Pose, dist_tolerance: float, query: PlaceQuery) -> PoseAnswer:
         """Nearest pose within ``dist_tolerance`` [m] where the disc fits: the pose itself, else a vertex near it.

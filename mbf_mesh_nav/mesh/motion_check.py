@@ -12,6 +12,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.maps.controllers.failures import obstacle_text
 from mbf_mesh_nav.arrays import BoolArray, Float32Array
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned, walk
@@ -67,7 +68,7 @@ def forbidden_ahead(
             return f"the surface ends at {position_text(point)}"
         comes_to = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
         if not may_enter(stands_on, comes_to):
-            return f"an obstacle is in the way: the robot would touch it at {position_text(point)}"
+            return obstacle_text(position_text(point))
         stands_on, walked = comes_to, walked + stride
         if command.wz != 0.0 and walked < on_arc:
             direction = turned(direction, vector_of(mesh.face_normals[face]), command.wz * stride / command.speed)

@@ -14,6 +14,7 @@ import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.geometry.arithmetic import arctan2, norm
+from mbf_abstract.maps.controllers.failures import obstacle_text
 from mbf_mesh_nav.arrays import Float32Array
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned
 from mbf_mesh_nav.kernels.motion.outline_sweep import sweep
@@ -70,7 +71,7 @@ def swept_obstacle(
     ahead = turned(tangent(vector_of(pose.rotation[:, 0]), normal), normal, course)
     step = command.speed * seconds, command.wz * seconds, steps
     touched, corner = sweep(mesh.surface, ranks, place.face, point, ahead, outline, *step)
-    return f"an obstacle is in the way: the robot would turn into it at {position_text(corner)}" if touched else ""
+    return obstacle_text(position_text(corner)) if touched else ""
 
 
 def points_on(corners: Sequence[Sequence[float]]) -> FloatArray:

@@ -10,8 +10,6 @@ import numpy as np
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
-from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.plugins import ControlResult
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
 
@@ -30,14 +28,6 @@ def tracker_on_surface(mesh_map: MeshMap, path: Path, reach: float) -> PathTrack
     if end is None:
         return PathTracker(path)
     return PathTracker(replace(path, positions=np.concatenate([path.positions[:-1], end.point[None]])))
-
-
-def missed_path(tracker: PathTracker, allowed: float) -> ControlResult | None:
-    """Failure of a controller whose robot is farther than ``allowed`` [m] from its path; None if it is not."""
-    if tracker.deviation <= allowed:
-        return None
-    message = f"the robot is {tracker.deviation:.2f} m from the path, allowed are {allowed:g} m"
-    return ControlResult(ExePathOutcome.MISSED_PATH, message)
 
 
 class GoalApproach:

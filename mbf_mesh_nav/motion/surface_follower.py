@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Pose
-from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.maps.controllers.failures import no_path, outside_map
 from mbf_abstract.plugins import ControlResult
 from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.motion.goal_approach import GoalApproach
 from mbf_mesh_nav.plugins import MeshController
 
@@ -22,11 +23,10 @@ class SurfaceFollower(MeshController):
     ) -> tuple[SurfacePoint, GoalApproach] | ControlResult:
         """Find the robot at most ``max_distance`` [m] from the surface; a failure if it is not there or has no plan."""
         if self._approach is None:
-            return ControlResult(ExePathOutcome.INVALID_PATH, "there is no plan to follow")
+            return no_path()
         spot = self.mesh_map.locate_one(pose.position, max_distance, hint_face)
         if spot is None:
-            text = f"the robot is more than {max_distance:g} m from the surface"
-            return ControlResult(ExePathOutcome.OUT_OF_MAP, text)
+            return outside_map(position_text(pose.position), f"no surface within {max_distance:g} m")
         return spot, self._approach
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:

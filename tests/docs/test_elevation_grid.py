@@ -107,7 +107,7 @@ def test_a_valid_pose_is_found_within_the_tolerance_only(navigator):
     queries = navigator.server.queries
     near = queries.find_valid_pose(FLANK, 3.0, 0.0, PlaceQuery(safety_dist=0.1))
 
-    assert near.state is CellState.FREE and 0.5 < near.pose.distance_to(FLANK) < 3.1
+    assert near.state is CellState.INSCRIBED and 0.5 < near.pose.distance_to(FLANK) < 3.1
     assert queries.find_valid_pose(FLANK, 0.3, 0.0).pose is None
 
 

@@ -153,7 +153,7 @@ def test_a_valid_pose_is_found_within_the_tolerance_only(world):
     queries = world.navigator.server.queries
     found = queries.find_valid_pose(Pose.planar(2.3, 0.0), 1.0, 0.0, PlaceQuery(safety_dist=0.1))
 
-    assert found.state is CellState.FREE and 0.2 < found.pose.distance_to(Pose.planar(2.3, 0.0)) <= 1.0
+    assert found.state is CellState.INSCRIBED and 0.2 < found.pose.distance_to(Pose.planar(2.3, 0.0)) <= 1.0
     assert queries.find_valid_pose(Pose.planar(2.3, 0.0), 0.05, 0.0).pose is None
 
 

@@ -17,6 +17,7 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.maps.controllers.failures import missed_path, no_path, outside_map
 from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
@@ -87,12 +88,11 @@ class FollowPath(MapPlugin, AbstractController):
         """Find the point ahead, steer to it, and check the motion for obstacles."""
         p, pose, tracker = self.parameters, request.pose, self._tracker
         if tracker is None:
-            return ControlResult(ExePathOutcome.INVALID_PATH, "no path has been set")
+            return no_path()
         tracker.update((pose.x, pose.y))
-        farthest = p.max_path_distance * self.relaxation.slack(self.clock.now()).controller_factor
-        if tracker.deviation > farthest:
-            text = f"{tracker.deviation:.2f} m off the path, limit {farthest:.2f} m"
-            return ControlResult(ExePathOutcome.MISSED_PATH, text)
+        factor = self.relaxation.slack(self.clock.now()).controller_factor
+        if missed := missed_path(tracker, p.max_path_distance * factor):
+            return missed
 
         def blocked(motion: Twist) -> str:
             return self.navigation_map.obstacle_ahead(there, motion, self._time_checked(motion, pose, tracker))
@@ -100,8 +100,7 @@ class FollowPath(MapPlugin, AbstractController):
         try:
             there = self.on_map(pose)
             if self.navigation_map.point_check()(there).state is CellState.OUTSIDE:
-                text = f"the robot ({there.x:.2f}, {there.y:.2f}) is outside the map"
-                return ControlResult(ExePathOutcome.OUT_OF_MAP, text)
+                return outside_map(f"({there.x:.2f}, {there.y:.2f})")
             command, obstacle = self._room_to_turn.choose(
                 pose,
                 tracker.progress,

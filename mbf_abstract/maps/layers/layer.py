@@ -50,6 +50,11 @@ class MapLayer(ABC):
         """Whether the layer takes scans of a source."""
         return source in self.source_names
 
+    @property
+    def forgets(self) -> bool:
+        """Whether it holds anything that clearing the map removes: by default if it asks for a source."""
+        return bool(self.source_names)
+
     def insert_scan(self, scan: RangeScan) -> None:  # noqa: B027 - for layers that name sources
         """Keep a scan of one of its sources, in the frame of the map and all of it finite, for the next update.
 

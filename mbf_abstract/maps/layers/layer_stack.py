@@ -58,6 +58,10 @@ class LayerStack(Mapping[str, Layer_co], Generic[Layer_co]):
         """All layers, or those of some names; KeyError names the known ones."""
         return list(self.values()) if names is None else [self[name] for name in names]
 
+    def forgetting(self, names: Iterable[str] | None) -> list[Layer_co]:
+        """The layers of ``chosen``, without those that clearing leaves as they are."""
+        return [layer for layer in self.chosen(names) if layer.forgets]
+
     @contextmanager
     def computing(self, layer: MapLayer) -> Iterator[None]:
         """Keep as ``problem`` what a layer raises in the ``with`` block, also a ``sys.exit()``, and raise it on."""

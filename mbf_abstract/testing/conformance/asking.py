@@ -13,6 +13,8 @@ from mbf_abstract.testing.conformance.site import Site, situation, somewhere
 
 NEAR = somewhere(3.85, 4.0)
 """A place from which a robot would touch the wall."""
+BESIDE = somewhere(3.65, 4.0)
+"""A place from which it would not, but from ahead of it, below the robot."""
 AWAY = somewhere(3.2, 4.0)
 """A place from which it would not."""
 
@@ -30,12 +32,16 @@ def a_point_is_free_inscribed_lethal_or_outside(site: Site) -> None:
 
 @situation()
 def a_pose_is_lethal_where_the_robot_touches_something(site: Site) -> None:
-    """check_pose returns FREE, or LETHAL where the robot touches something; without a pose it checks the robot's."""
+    """check_pose returns LETHAL where the robot touches something, INSCRIBED where it covers inscribed places, or FREE.
+
+    Without a pose it checks the robot's.
+    """
     site.place(WALL)
     check = site.server.queries.check_pose
     for pose, state in (
         (None, CellState.FREE),
         (AWAY, CellState.FREE),
+        (BESIDE, CellState.INSCRIBED),
         (NEAR, CellState.LETHAL),
         (FACE, CellState.LETHAL),
     ):
@@ -57,6 +63,8 @@ def a_path_is_as_bad_as_its_worst_pose(site: Site) -> None:
     site.expect(whole.last_checked == len(path) - 1, f"it ended at pose {whole.last_checked} of {len(path)}")
     site.expect(early.state is CellState.LETHAL, f"with return_on the state is {early.state.name}")
     site.expect(5 < early.last_checked < 21, f"return_on ended it at pose {early.last_checked}")
+    beside = queries.check_path(site.path((2.0, 4.0), (3.65, 4.0))).state
+    site.expect(beside is CellState.INSCRIBED, f"the state of a path that ends beside the wall is {beside.name}")
     some = queries.check_path(path[:9], skip_poses=3)
     site.expect(some.state is CellState.FREE, f"the state of the free part is {some.state.name}")
     site.expect(some.last_checked == 8, f"with skip_poses 3 the last checked pose was {some.last_checked}, expected 8")

@@ -56,10 +56,10 @@ def a_figure_of_eight_is_driven_in_order(site: Site) -> None:
 
 @situation(controller_max_retries=0)
 def an_obstacle_on_the_path_stops_the_robot(site: Site) -> None:
-    """An obstacle on the path ends driving with BLOCKED_PATH before it is touched."""
+    """An obstacle on the path ends driving with BLOCKED_PATH and its place, before it is touched."""
     site.place(Box(4.5, 3.0, 4.8, 5.0))
     result = site.navigator.exe_path(site.path((2.0, 4.0), (8.0, 4.0)))
-    site.expect_outcome(result, ExePathOutcome.BLOCKED_PATH)
+    site.expect_outcome(result, ExePathOutcome.BLOCKED_PATH, "an obstacle is in the way", "would touch it at (4.")
     site.expect_no_contact()
     site.expect(site.rig.robot.pose.x > 2.5, "the robot did not even drive up to the obstacle")
 
@@ -126,21 +126,28 @@ def a_path_without_poses_is_invalid(site: Site) -> None:
 def a_path_far_from_the_robot_is_missed(site: Site) -> None:
     """A path that begins metres away from the robot ends with MISSED_PATH, and the robot does not move."""
     result = site.navigator.exe_path(site.path((8.0, 6.0), (10.0, 6.0)))
-    site.expect_outcome(result, ExePathOutcome.MISSED_PATH, "6.32 m")
+    site.expect_outcome(result, ExePathOutcome.MISSED_PATH, "the robot is 6.32 m from the path, allowed")
     site.expect_near(START.x, START.y, 0.05, "the path is elsewhere")
 
 
 @situation(controller_max_retries=0)
 def a_robot_that_left_the_map_stands(site: Site) -> None:
-    """A robot outside the map that it drives on ends its path with OUT_OF_MAP; a window around it has no outside."""
+    """A robot outside the map that it drives on ends its path with OUT_OF_MAP, and gets no plan on any map.
+
+    A window around the robot has no outside: as in Nav2 and MBF only what is in it stops the robot there.
+    """
     site.rig.robot.T_map_odom = replace(site.rig.robot.T_map_odom, translation=(-4.0, 0.0, 0.0))
     site.rig.clock.sleep(0.6)
     here = site.server.runtime.robot.pose()
     outside = site.map.point_check()(here).state is CellState.OUTSIDE
+    plan = site.navigator.go_to(somewhere(5.0, 4.0), recovery_behaviors=())
+    site.expect_outcome(plan, GetPathOutcome.OUT_OF_MAP, "start (-2.00, 4.00")
     result = site.navigator.exe_path(site.path((here.x, here.y), (0.0, 4.0)))
-    site.expect_outcome(result, ExePathOutcome.OUT_OF_MAP if outside else ExePathOutcome.SUCCESS)
     if outside:
+        site.expect_outcome(result, ExePathOutcome.OUT_OF_MAP, "the robot (-2.00, 4.00", "is outside the map")
         site.expect_stands(0.5, "the robot left the map")
+    else:
+        site.expect_outcome(result, ExePathOutcome.SUCCESS)
 
 
 @situation()

@@ -66,6 +66,19 @@ def clear_frees_what_is_gone(site: Site) -> None:
 
 
 @situation()
+def clear_names_what_has_forgotten(site: Site) -> None:
+    """The recovery clear names the layers that sensors fill, and no others."""
+    layers = {name: bool(layer.source_names) for name, layer in site.map.layers.items()}
+    everything = site.navigator.recover("clear").message
+    for name, sensed in layers.items():
+        site.expect((name in everything) == sensed, f"layer {name!r}, sensed: {sensed}; the message is {everything!r}")
+    others = [name for name, sensed in layers.items() if not sensed]
+    if others:
+        site.server.set_plugin_parameters(PluginKind.RECOVERY, "clear", layers=others)
+        site.expect_outcome(site.navigator.recover("clear"), RecoveryOutcome.SUCCESS, "cleared nothing")
+
+
+@situation()
 def relax_grants_a_tolerance_for_its_time(site: Site) -> None:
     """The recovery relax lets paths end beside a blocked goal for its duration, and no longer."""
     site.place(WALL)

@@ -97,7 +97,7 @@ class TileQuestions(OutlinedMap):
         """
         if center_only:
             return self.point_check()
-        radius = OF_PLACES + self.inscribed_radius + query.safety_dist
+        radius = OF_PLACES + 2.0 * self.inscribed_radius + query.safety_dist
         self._check_reach(radius)
         now = self.moment()
 
@@ -116,7 +116,7 @@ class TileQuestions(OutlinedMap):
         the disc is wider than what is left of ``reach``.
         """
         within = min(dist_tolerance, SEARCHED * self.spacing)
-        there = self.around(pose.x, pose.y, within + OF_PLACES + self.inscribed_radius + query.safety_dist)
+        there = self.around(pose.x, pose.y, within + OF_PLACES + 2.0 * self.inscribed_radius + query.safety_dist)
         if there is None:
             return PoseAnswer(OUTSIDE.state, OUTSIDE.cost, None)
         return there.places().find_valid_pose(pose, within, query)

@@ -80,7 +80,7 @@ def test_the_nearest_free_pose_within_the_tolerance_keeps_its_heading(queries):
     found = queries.find_valid_pose(wanted, 1.5, 0.0)
 
     assert found.pose.position == pytest.approx((-0.5, 2.0, 0.0))
-    assert (found.state, found.pose.orientation) == (CellState.FREE, wanted.orientation)
+    assert (found.state, found.pose.orientation) == (CellState.INSCRIBED, wanted.orientation)
     assert queries.find_valid_pose(wanted, 1.5, 0.0, PlaceQuery(safety_dist=0.25)).pose.x == pytest.approx(-0.8)
 
 

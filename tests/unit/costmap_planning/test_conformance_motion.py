@@ -50,7 +50,7 @@ def ahead(costmap, velocity, seconds):
 def test_a_collision_is_foreseen_from_its_time_on_and_not_before(points, velocity, seconds):
     costmap, tolerance = points_at(*points), 1.5 * RESOLUTION / 0.5
     assert ahead(costmap, velocity, seconds - tolerance) == ""
-    assert "the footprint would touch it" in ahead(costmap, velocity, seconds + tolerance)
+    assert "the robot would touch it" in ahead(costmap, velocity, seconds + tolerance)
 
 
 @pytest.mark.parametrize("depth", [0.02, 0.05, 0.15, 0.3])
@@ -60,7 +60,7 @@ def test_f153_from_a_collision_only_what_leads_deeper_is_refused(depth):
     for costmap in (pole, wall):
         assert ahead(costmap, (-0.5, 0.0), 1.0) == ""
     behind = points_at((0.5 - depth, 0.0), *((0.55, 0.01 * i) for i in range(-10, 10)))
-    assert "the footprint would touch it at (0.0" in ahead(behind, (0.5, 0.0), 1.0)
+    assert "the robot would touch it at (0.0" in ahead(behind, (0.5, 0.0), 1.0)
 
 
 def test_f154_what_lies_beyond_the_time_looked_ahead_is_no_obstacle_yet():

@@ -107,7 +107,7 @@ def test_obstacle_on_the_path_is_blocked_path_and_says_where(pursuit):
     cells[90:110, 108:111] = 254
     result = first_command(pursuit(Costmap(cells, 0.05, -5.0, -5.0)), straight(), velocity=Twist.planar(0.5))
     assert result.outcome == ExePathOutcome.BLOCKED_PATH
-    assert "collide at (0." in result.message
+    assert "touch it at (0." in result.message
 
 
 @pytest.mark.parametrize(("shortest", "gap"), [(0.0, 0.0), (0.3, 0.3)], ids=["by-time", "by-distance"])
@@ -151,7 +151,7 @@ def test_the_collision_check_may_have_a_padding_of_its_own(make_plugin):
 
 def test_far_from_the_path_it_is_missed(pursuit):
     result = first_command(pursuit(), straight(), pose=Pose.planar(0, 2.0))
-    assert result.outcome == ExePathOutcome.MISSED_PATH and "2.00 m off the path" in result.message
+    assert result.outcome == ExePathOutcome.MISSED_PATH and "2.00 m from the path" in result.message
 
 
 def test_robot_off_the_map_is_out_of_map(pursuit):

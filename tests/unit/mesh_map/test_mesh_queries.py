@@ -85,7 +85,10 @@ def test_cost_of_a_point_is_interpolated(queries: MapQueries):
 
 
 def test_robot_fits_until_its_disc_touches_the_wall(queries: MapQueries):
-    assert queries.check_pose(Pose.planar(1.7, 1.0)).state == CellState.FREE
+    assert queries.check_pose(Pose.planar(1.4, 1.0)).state == CellState.FREE
+    assert queries.check_pose(Pose.planar(1.5, 1.0)).state == CellState.INSCRIBED
+    assert queries.check_pose(Pose.planar(1.42, 1.0), PlaceQuery(safety_dist=0.1)).state == CellState.INSCRIBED
+    assert queries.check_pose(Pose.planar(1.7, 1.0)).state == CellState.INSCRIBED
     assert queries.check_pose(Pose.planar(1.8, 1.0)).state == CellState.LETHAL
     assert queries.check_pose(Pose.planar(1.7, 1.0), PlaceQuery(safety_dist=0.1)).state == CellState.LETHAL
 
@@ -121,7 +124,7 @@ def test_nearest_valid_pose_is_beside_the_wall_on_the_same_storey(queries: MapQu
 
     found = queries.find_valid_pose(wanted, 0.5, 0.0)
 
-    assert found.state == CellState.FREE
+    assert found.state == CellState.INSCRIBED
     assert found.pose is not None
     assert found.pose.position == pytest.approx((1.7, 1.0, 0.0))
     assert found.pose.orientation == wanted.orientation

@@ -147,7 +147,10 @@ def test_rotating_turns_once_around_on_level_ground_but_not_on_a_slope(run, plai
 def test_clearing_layers_frees_what_was_sensed(run, plain, paint, monkeypatch):
     mesh_map = paint(plain(), lambda v: np.where(v[:, 0] > 5, np.inf, 0.0))
     layer = mesh_map.layers["painted"]
-    monkeypatch.setattr(layer, "clear", lambda: layer.replace(np.zeros_like(layer.costs), np.zeros_like(layer.lethal)))
+    result, _ = run(ClearRecovery, mesh_map, layers=("painted",))
+    assert result.success and result.message.startswith("cleared nothing"), "no sensor fills it"
+    emptied = np.zeros_like(layer.costs), np.zeros_like(layer.lethal)
+    monkeypatch.setattr(type(layer), "clear", lambda self: self.replace(*emptied))
     result, _ = run(ClearRecovery, mesh_map, layers=("painted",))
     assert result.success and result.message == "cleared painted"
     assert not mesh_map.snapshot().lethal.any()

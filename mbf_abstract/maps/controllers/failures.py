@@ -1,0 +1,31 @@
+"""How controllers of every map report the same failure: one code and one text for it, whatever the map."""
+
+from __future__ import annotations
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.plugins import ControlResult
+
+
+def obstacle_text(place: str) -> str:
+    """Where the robot would touch an obstacle if it drove on, as the text of BLOCKED_PATH and of ``obstacle_ahead``."""
+    return f"an obstacle is in the way: the robot would touch it at {place}"
+
+
+def no_path() -> ControlResult:
+    """Failure of a controller that has been given no path."""
+    return ControlResult(ExePathOutcome.INVALID_PATH, "no path has been set")
+
+
+def missed_path(tracker: PathTracker, allowed: float) -> ControlResult | None:
+    """Failure of a controller whose robot is farther than ``allowed`` [m] from its path; None if it is not."""
+    if tracker.deviation <= allowed:
+        return None
+    message = f"the robot is {tracker.deviation:.2f} m from the path, allowed are {allowed:g} m"
+    return ControlResult(ExePathOutcome.MISSED_PATH, message)
+
+
+def outside_map(place: str, limits: str = "") -> ControlResult:
+    """Failure of a controller whose robot stands off its map, whose ``limits`` may be added."""
+    text = f"the robot {place} is outside the map{f': {limits}' if limits else ''}"
+    return ControlResult(ExePathOutcome.OUT_OF_MAP, text)
