@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.maps.view import GridView, MeshView
-from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_ros.messages import maps
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message
+from mbf_ros.messages.nav2_queries import map_frame
 from mbf_ros.robot_inputs import Quality
 
 MESH_ID = "mbf"
@@ -81,8 +81,7 @@ class MapMessages(ABC):
         audience: Callable[[str], Audience],
     ) -> None:
         self._server, self._name, self._context, self._audience = server, name, context, audience
-        served = server.served.get(name) if isinstance(server, MapServer) else None
-        self._frame_id: str = served.map.frame_id if served else server.runtime.robot.global_frame
+        self._frame_id = map_frame(server, name)
 
     @abstractmethod
     def changes(self, now: float) -> Iterator[tuple[str, Message]]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
-from mbf_abstract.maps.view import FieldView, MeshView
+from mbf_abstract.maps.view import FieldView, GridView, MeshView
 from mbf_ros.messages.geometry import MessageContext, duration, pose, vector
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.messages.records import colors, points, triangles
@@ -16,6 +16,7 @@ from mbf_ros.messages.records import colors, points, triangles
 UNKNOWN_CELL, INSCRIBED_CELL, LETHAL_CELL = -1, 99, 100
 COST_STEPS = 253
 """Cost 1 of a view in the units of a costmap, whose costs 1 to 252 are the cells 1 to 98, as in Nav2."""
+LETHAL_COST, UNKNOWN_COST = 254, 255
 LINE_LIST, TRIANGLE_LIST = 5, 11
 FREE_COLOR, FORBIDDEN_COLOR = (0.55, 0.75, 0.55), (0.80, 0.25, 0.20)
 ARROW_LENGTH = 0.25  # m
@@ -44,6 +45,20 @@ def occupancy_cells(costs: NDArray[np.float32]) -> NDArray[np.int8]:
     cells[known > 1.0] = LETHAL_CELL
     cells[np.isnan(costs)] = UNKNOWN_CELL
     return cells
+
+
+def costmap_costs(costs: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Return costs (height, width) of a view as the costs of Nav2's costmaps.
+
+    0 is free, 253 where the robot's middle must not be (cost 1), 254 an obstacle (above 1), and 255 unknown (nan).
+    """
+    known = np.nan_to_num(costs, nan=0.0, posinf=2.0)
+    scaled: NDArray[np.uint8] = np.clip(np.rint(COST_STEPS * known), 1.0, COST_STEPS - 1.0).astype(np.uint8)
+    scaled[known <= 0.0] = 0
+    scaled[known >= 1.0] = COST_STEPS
+    scaled[known > 1.0] = LETHAL_COST
+    scaled[np.isnan(costs)] = UNKNOWN_COST
+    return scaled
 
 
 def changed_window(before: NDArray[np.int8], after: NDArray[np.int8]) -> CellWindow | None:
@@ -77,6 +92,24 @@ def occupancy_grid(
         },
         "data": cells.reshape(-1),
     }
+
+
+def costmap(view: GridView, layer: str, frame_id: str, stamp: float, context: MessageContext) -> Message:
+    """Return a view of the layer of this name as a nav2_msgs/Costmap."""
+    costs = costmap_costs(view.costs)
+    height, width = costs.shape
+    x_min, x_max, y_min, _ = view.extent
+    header = context.header(frame_id, stamp)
+    metadata = {
+        "map_load_time": header["stamp"],
+        "update_time": header["stamp"],
+        "layer": layer,
+        "resolution": (x_max - x_min) / width,
+        "size_x": width,
+        "size_y": height,
+        "origin": pose(Pose((x_min, y_min, 0.0))),
+    }
+    return {"header": header, "metadata": metadata, "data": costs.reshape(-1)}
 
 
 def occupancy_grid_update(

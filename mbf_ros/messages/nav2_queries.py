@@ -1,4 +1,4 @@
-"""Services of nav2_msgs that ask or clear the map."""
+"""Services of nav2_msgs that ask, clear or hand out the map."""
 
 from __future__ import annotations
 
@@ -9,13 +9,20 @@ from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.queries import CellState
+from mbf_abstract.maps.view import GridView
+from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_ros.messages import maps
 from mbf_ros.messages.geometry import MessageContext, path_of
 from mbf_ros.messages.interfaces import Message, MessageError
 from mbf_ros.messages.mbf_queries import MapQuestion
 
-LETHAL_COST = 254  # of a cell, as Nav2 counts
-LIMITS = {253: CellState.INSCRIBED, LETHAL_COST: CellState.LETHAL, 255: CellState.LETHAL}
+INSCRIBED_COST, LETHAL_COST = maps.COST_STEPS, maps.LETHAL_COST
+LIMITS = {
+    INSCRIBED_COST: CellState.INSCRIBED,
+    LETHAL_COST: CellState.LETHAL,
+    maps.UNKNOWN_COST: CellState.LETHAL,
+}
 """From which state on a place is forbidden, by ``max_cost``."""
 NOT_VALID: Message = {"is_valid": False, "invalid_pose_indices": []}
 """The answer where there is none."""
@@ -64,7 +71,29 @@ def _clearing(local: bool, inside: bool | None = None) -> MapQuestion:
     return MapQuestion(f"nav2_msgs/srv/{name}", clear, {})
 
 
+def map_frame(server: AbstractNavigationServer, name: str) -> str:
+    """Return the frame of one of the ``map_views`` of a server."""
+    served = server.served.get(name) if isinstance(server, MapServer) else None
+    return served.map.frame_id if served else server.runtime.robot.global_frame
+
+
+def _handing_out(name: str) -> MapQuestion:
+    """Service that returns one of the two costmaps; where a server has only one of cells, that one."""
+
+    def get(server: AbstractNavigationServer, request: Message, context: MessageContext) -> Message:
+        shown = name if name in server.map_views else next(iter(server.map_views), "")
+        view = server.map_view(shown)
+        if not isinstance(view, GridView) or not view.costs.size:
+            raise MessageError("this map has no cells; the costs of a mesh are on ~/vertex_costs")
+        now = server.runtime.clock.now()
+        return {"map": maps.costmap(view, shown, map_frame(server, shown), now, context)}
+
+    return MapQuestion("nav2_msgs/srv/GetCostmap", get, {})
+
+
 NAV2_QUESTIONS = {
+    "global_costmap/get_costmap": _handing_out("global_costmap"),
+    "local_costmap/get_costmap": _handing_out("local_costmap"),
     "is_path_valid": MapQuestion("nav2_msgs/srv/IsPathValid", is_path_valid, NOT_VALID),
     "global_costmap/clear_entirely_global_costmap": _clearing(local=False),
     "local_costmap/clear_entirely_local_costmap": _clearing(local=True),

@@ -130,6 +130,24 @@ def test_each_clearing_service_clears_its_map_where_it_says(made):
                 assert marked(made, other) == {True, False}, name
 
 
+@pytest.mark.parametrize("name", ["global_costmap", "local_costmap"])
+def test_a_costmap_is_handed_out_with_its_obstacles_and_a_mesh_is_refused(made, name):
+    question = NAV2_QUESTIONS[f"{name}/get_costmap"]
+    if made.server.backend == "mesh":
+        with pytest.raises(MessageError, match=r"this map has no cells; the costs of a mesh are on ~/vertex_costs"):
+            question.ask(made.server, {}, CONTEXT)
+        return
+    costmap = question.ask(made.server, {}, CONTEXT)["map"]
+    metadata, frame = costmap["metadata"], costmap["header"]["frame_id"]
+    assert (metadata["layer"], frame) == (name, "map")
+    costs = costmap["data"].reshape(metadata["size_y"], metadata["size_x"])
+    origin = metadata["origin"]["position"]
+    row, wall, robot = (
+        int((place - origin[axis]) / metadata["resolution"]) for place, axis in ((4.0, "y"), (4.05, "x"), (2.0, "x"))
+    )
+    assert costs[row, wall] == 254 and costs[row, robot] == 0
+
+
 def test_the_whole_path_counts_while_the_robot_is_lost(made):
     path = made.path((4.2, 4.0), (2.0, 4.0))
     made.server.runtime.robot.pose = lost

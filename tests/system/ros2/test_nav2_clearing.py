@@ -1,4 +1,4 @@
-"""A client of Nav2 clears costmaps: whether a wall that the robot does not see any more is still in the map."""
+"""A client of Nav2 asks for costmaps and clears them: is a wall that the robot does not see any more still there?"""
 
 import math
 
@@ -53,3 +53,16 @@ def test_a_service_clears_the_part_it_names_of_the_map_it_names(trio, service, l
         assert blocked() == (before if is_kept else [])
     finally:
         trio.robot.set("scan", "on")
+
+
+@pytest.mark.parametrize("name", ["global_costmap", "local_costmap"])
+def test_a_costmap_is_handed_out_with_the_wall(trio, name):
+    def wall():
+        costmap = ask(trio, f"{name}/get_costmap", {})["map"]
+        metadata, data = costmap["metadata"], costmap["data"]
+        assert (metadata["size_x"], metadata["size_y"], len(data)) == (100, 100, 10_000)
+        return {divmod(i, metadata["size_x"])[0] for i, cost in enumerate(data) if cost == 254}
+
+    while not (rows := wall()):
+        pass
+    assert rows <= {69, 70}  # 4 m on the left of the robot

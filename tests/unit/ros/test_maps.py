@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mbf_abstract.maps.view import FieldView, MeshView
+from mbf_abstract.maps.view import FieldView, GridView, MeshView
 from mbf_ros.messages import maps
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import completed, fields_of
@@ -32,6 +32,25 @@ def test_cells_are_those_of_nav2_for_every_cost():
 
 def test_what_is_forbidden_without_a_limit_is_an_obstacle_and_a_slight_cost_is_not_free():
     assert maps.occupancy_cells(np.float32([[np.inf, 1e-4, -1.0]])).tolist() == [[100, 1, 0]]
+
+
+def test_costs_are_those_of_the_costmap_that_is_viewed_for_every_cost():
+    costs = np.arange(256, dtype=np.uint8)
+    view = np.divide(costs, np.float32(253), dtype=np.float32)
+    view[255] = np.nan
+    assert maps.costmap_costs(view[None])[0].tolist() == costs.tolist()
+    assert maps.costmap_costs(np.float32([[np.inf, 1e-4, -1.0, 0.9999]])).tolist() == [[254, 1, 0, 252]]
+
+
+def test_a_costmap_lies_where_its_view_does():
+    view = GridView(np.float32([[0.0, 0.5, 1.0], [2.0, np.nan, 0.004]]), (-1.0, 0.5, 2.0, 3.0))
+    message = maps.costmap(view, "global_costmap", "map", 1.0, CONTEXT)
+    assert message["data"].tolist() == [0, 126, 253, 254, 255, 1]
+    metadata = message["metadata"]
+    assert (metadata["size_x"], metadata["size_y"], metadata["resolution"]) == (3, 2, 0.5)
+    assert (metadata["origin"]["position"]["x"], metadata["origin"]["position"]["y"]) == (-1.0, 2.0)
+    assert set(message) == {field.name for field in fields_of("nav2_msgs/msg/Costmap")}
+    assert set(metadata) == {field.name for field in fields_of("nav2_msgs/msg/CostmapMetaData")}
 
 
 def test_a_grid_lies_where_its_view_does():

@@ -25,7 +25,7 @@ from nav2_msgs.action import (
     Spin,
     Wait,
 )
-from nav2_msgs.srv import ClearCostmapAroundRobot, ClearCostmapExceptRegion, ClearEntireCostmap, IsPathValid
+from nav2_msgs.srv import ClearCostmapAroundRobot, ClearCostmapExceptRegion, ClearEntireCostmap, GetCostmap, IsPathValid
 from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -45,6 +45,7 @@ ACTIONS = {
 }
 SERVICES = {
     "is_path_valid": IsPathValid,
+    **{f"{name}_costmap/get_costmap": GetCostmap for name in ("global", "local")},
     **{f"{name}_costmap/clear_entirely_{name}_costmap": ClearEntireCostmap for name in ("global", "local")},
     **{f"{name}_costmap/clear_around_{name}_costmap": ClearCostmapAroundRobot for name in ("global", "local")},
     **{f"{name}_costmap/clear_except_{name}_costmap": ClearCostmapExceptRegion for name in ("global", "local")},
