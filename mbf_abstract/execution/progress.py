@@ -8,6 +8,9 @@ from mbf_abstract.goals.goal_types import ExePathFeedback
 from mbf_abstract.plugins import ControlResult
 from mbf_abstract.time.clock import Clock, Stopwatch
 
+SET_OFF = 0.05
+"""A robot that has come this far [m] has set off. Before that it may turn on the spot, and has no speed to go by."""
+
 
 class PathProgress:
     """Feedback of a robot that is tracked along one path after the other."""
@@ -33,8 +36,10 @@ class PathProgress:
         to_go = self._tracker.deviation + self._tracker.remaining
         if self._start_distance is None:
             self._start_distance = to_go
-        done, elapsed = self._start_distance - to_go, self._watch.elapsed
-        time_to_goal = to_go * elapsed / done if done > 0.0 else float("inf")
+        done = self._start_distance - to_go - SET_OFF
+        if done <= 0.0:
+            self._watch.restart()
+        time_to_goal = to_go * self._watch.elapsed / done if done > 0.0 else float("inf")
         return ExePathFeedback(
             outcome=int(result.outcome),
             message=result.message,

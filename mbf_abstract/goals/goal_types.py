@@ -280,7 +280,7 @@ class ExePathFeedback:
     distance_along_path : float
         Distance to go along the path [m].
     time_to_goal : float
-        ``distance_along_path`` at the mean speed so far [s]; infinite while the robot has not moved.
+        ``distance_along_path`` at the mean speed since the robot set off [s]; infinite until it has come 5 cm.
     last_command : Command, optional
         What the plugin computed, also where something else was sent.
     """

@@ -241,6 +241,19 @@ def test_feedback_reports_where_the_robot_is_on_its_path(make_session):
     assert len(session.recorded(EventKind.LEASE_GRANTED)) == 1
 
 
+def test_the_time_to_the_goal_is_right_soon_after_a_robot_that_turned_first_has_set_off(make_session):
+    """It turns for two seconds and then drives at 0.5 m/s."""
+    session, seen = make_session(), []
+    session.controller.play(*[drive(0.0, wz=0.1)] * 40, drive(0.5, wz=0.0))
+    handle = session.navigator.send(ExePathGoal(session.path_to(3.0)))
+    handle.add_feedback_callback(seen.append)
+    handle.wait()
+    session.clock.sleep(0.1)
+    assert all(math.isinf(feedback.time_to_goal) for feedback in seen[:40])
+    soon = next(feedback for feedback in seen if feedback.distance_along_path < 2.8)
+    assert soon.time_to_goal == pytest.approx(soon.distance_along_path / 0.5, rel=0.4)
+
+
 def test_a_loop_ends_with_one_event_that_counts_its_cycles(make_session):
     session = make_session(controller_max_retries=-1)
     session.controller.play(FAILS, FAILS, drive())
