@@ -133,7 +133,8 @@ def settle_footprints(
     wheelbase: float,
     track: float,
     rigid: bool,
-) -> tuple[Float32Array, Float32Array, Float32Array]:
+    margins: FloatArray,
+) -> tuple[Float32Array, Float32Array, Float32Array, Float32Array]:
     """Settle a robot at every vertex and heading.
 
     Parameters
@@ -142,6 +143,8 @@ def settle_footprints(
         Where the wheels of all headings stand, see ``wheel_directions``.
     rigid : bool
         Whether the body stands on three wheels; then roll and pitch are the steeper of the two stances.
+    margins : (V,) float64
+        How much higher [m] than on the map each vertex may be below the belly.
 
     Returns
     -------
@@ -149,12 +152,15 @@ def settle_footprints(
         Left side up and nose up are positive [rad]; inf where a wheel has no ground.
     bump : (V, heading_count) float32
         How far [m] the surface inside the footprint rises above the plane of the wheels; inf likewise.
+    raised : (V, heading_count) float32
+        The same with each vertex higher by its margin.
     """
     vertices, count = surface.vertices, surface.vertices.shape[0]
     heading_count = len(wheel_order) // 4
     roll = np.empty((count, heading_count), dtype=np.float32)
     pitch = np.empty((count, heading_count), dtype=np.float32)
     bump = np.empty((count, heading_count), dtype=np.float32)
+    raised = np.empty((count, heading_count), dtype=np.float32)
     radius = 0.5 * np.hypot(wheelbase, track)
     ring = np.empty(4 * heading_count, dtype=np.float64)
     wheels = np.empty(4 * heading_count, dtype=np.float64)
@@ -162,7 +168,8 @@ def settle_footprints(
     members = np.empty(count, dtype=np.int32)
     for vertex in range(count):
         for heading in range(heading_count):
-            roll[vertex, heading] = pitch[vertex, heading] = bump[vertex, heading] = np.inf
+            roll[vertex, heading] = pitch[vertex, heading] = np.inf
+            bump[vertex, heading] = raised[vertex, heading] = np.inf
         start_face = upward_face(surface, vertex)
         if start_face < 0:
             continue
@@ -190,12 +197,16 @@ def settle_footprints(
             yaw = 2.0 * np.pi * heading / heading_count
             cosine, sine = np.cos(yaw), np.sin(yaw)
             highest = centre[2] - middle
+            highest_raised = highest + margins[vertex]
             for index in range(size):
                 other = members[index]
                 dx, dy = vertices[other, 0] - centre[0], vertices[other, 1] - centre[1]
                 forward, left = cosine * dx + sine * dy, cosine * dy - sine * dx
                 if abs(forward) <= 0.5 * wheelbase and abs(left) <= 0.5 * track:
                     plane = middle + rise_forward * forward + rise_left * left
-                    highest = max(highest, vertices[other, 2] - plane)
+                    height = vertices[other, 2] - plane
+                    highest = max(highest, height)
+                    highest_raised = max(highest_raised, height + margins[other])
             bump[vertex, heading] = highest
-    return roll, pitch, bump
+            raised[vertex, heading] = highest_raised
+    return roll, pitch, bump, raised

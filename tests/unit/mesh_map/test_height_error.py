@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from mbf_mesh_nav.building.map_build import write_map
 from mbf_mesh_nav.files.map_header import MapHeader, read_map_header
 from mbf_mesh_nav.files.mesh_io import read_mesh
-from mbf_mesh_nav.kernels.layers.footprint_settling import wheel_directions
+from mbf_mesh_nav.kernels.layers.footprint_settling import settle_footprints, wheel_directions
 from mbf_mesh_nav.kernels.layers.wheel_errors import errors_below_wheels
 from mbf_mesh_nav.layers.height_diff import HeightDiffLayer
 from mbf_mesh_nav.layers.steepness import SteepnessLayer
@@ -103,7 +103,7 @@ def test_limits_and_clearance_of_the_footprint_are_lower_by_the_error():
     exact, wrong = (computed(mesh, TiltLayer, height_error=error) for error in (None, ERROR))
     slopes = [np.arctan(np.sqrt(2.0) * ERROR / length) for length in (0.4, 0.5, 0.5)]
     np.testing.assert_allclose(np.subtract(exact.limits(), wrong.limits()), slopes)
-    assert wrong.room_below == pytest.approx(wrong.parameters.ground_clearance - np.sqrt(2.0) * ERROR)
+    assert wrong.room_below == pytest.approx(wrong.parameters.ground_clearance - 1.5 * ERROR)
 
 
 def test_layers_take_the_error_from_the_map_file(map_file):
@@ -193,6 +193,40 @@ def test_the_error_below_the_wheels_is_that_of_the_faces_they_stand_on(seed):
     directions = wheel_directions(HEADINGS, wheelbase, track)
     found = errors_below_wheels(mesh.topology.surface, *directions, 0.5 * np.hypot(wheelbase, track), errors)
     np.testing.assert_allclose(found, wheel_errors_one_by_one(mesh, wheelbase, track, errors), rtol=1e-5)
+
+
+def test_no_belly_is_led_over_a_boulder_that_wrong_scans_have_smeared_to_a_flat_hill():
+    heights = np.zeros((15, 15))
+    heights[7, 7] = 0.02
+    mesh = MeshMap.from_heights(heights, 0.2, 0.2)
+    away = np.abs(mesh.vertices[:, :2] - 1.4).max(axis=1)
+    errors = np.where(away < 0.01, 0.08, 0.03)
+    husky = {"wheelbase": 0.512, "track": 0.571, "rigid": True, "ground_clearance": 0.12}
+    layer = computed(mesh, TiltLayer, errors, **husky)
+    assert not layer.allowed[away < 0.01].any()
+    beside = (away > 0.19) & (away < 0.21) & (np.abs(mesh.vertices[:, 1] - 1.4) < 0.01)
+    assert not layer.allowed[beside][:, [0, 8]].any()  # the boulder is not under the middle and not under a wheel
+    assert layer.allowed[(away > 0.5) & (away < 0.9)].all()
+
+
+@settings(deadline=None, max_examples=8)
+@given(st.integers(0, 1000))
+def test_ground_below_the_belly_is_as_high_as_its_highest_vertex_with_its_margin(seed):
+    rng = np.random.default_rng(seed)
+    mesh = MeshMap.from_heights(rng.normal(0.0, 0.05, (9, 8)), 0.2, 0.23)
+    margins, wheelbase, track = rng.uniform(0.0, 0.1, len(mesh.vertices)), 0.51, 0.37
+    directions = wheel_directions(HEADINGS, wheelbase, track)
+    roll, pitch, bump, raised = settle_footprints(mesh.topology.surface, *directions, wheelbase, track, False, margins)
+    for vertex, centre in enumerate(mesh.vertices):
+        for heading in np.flatnonzero(np.isfinite(roll[vertex])):
+            yaw, across = 2.0 * np.pi * heading / HEADINGS, mesh.vertices - centre
+            ahead = np.cos(yaw) * across[:, 0] + np.sin(yaw) * across[:, 1]
+            left = np.cos(yaw) * across[:, 1] - np.sin(yaw) * across[:, 0]
+            inside = (np.abs(ahead) <= 0.5 * wheelbase) & (np.abs(left) <= 0.5 * track)
+            rise = np.tan(pitch[vertex, heading]) * ahead + np.tan(roll[vertex, heading]) * left
+            above = (mesh.vertices[:, 2] - rise)[inside]
+            higher = (above + margins[inside]).max() - above.max()
+            assert raised[vertex, heading] - bump[vertex, heading] == pytest.approx(higher, abs=1e-5)
 
 
 @settings(deadline=None, max_examples=10)
