@@ -205,7 +205,9 @@ class MeshNavigationServer(MapServer):
         """The mesh with the costs of a layer, of the default layer without a name."""
         source = self.mesh_map.layers[name] if name else self.mesh_map.snapshot()
         costs = np.where(source.lethal, np.inf, source.costs).astype(np.float32)
-        return MeshView(self.mesh_map.vertices, self.mesh_map.faces, costs)
+        shown = name or self.mesh_map.default_layer
+        unit = self.mesh_map.layers[shown].unit if shown else ""
+        return MeshView(self.mesh_map.vertices, self.mesh_map.faces, costs, unit)
 
     def field_view(self, path: PlannedPath) -> FieldView | None:
         """Directions at the vertices from which the path's first vector field leads to its goal."""

@@ -103,11 +103,14 @@ class MeshView:
     faces : (F, 3) int32
     costs : (V,) float32
         0 free to 1 and above forbidden; inf is forbidden.
+    unit : str
+        Of the costs, such as rad; empty = none.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
     costs: NDArray[np.float32]
+    unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,6 +44,7 @@ class HeightDiffLayer(MeshLayer):
 
     Parameters = HeightDiffParameters
     parameters: HeightDiffParameters
+    unit = "m"
     cacheable = True
 
     @classmethod

@@ -24,6 +24,7 @@ class RoughnessLayer(MeshLayer):
 
     Parameters = RoughnessParameters
     parameters: RoughnessParameters
+    unit = "rad"
     cacheable = True
 
     @classmethod

@@ -32,6 +32,7 @@ class SteepnessLayer(MeshLayer):
 
     Parameters = SteepnessParameters
     parameters: SteepnessParameters
+    unit = "rad"
 
     @classmethod
     def reach(cls, parameters: SteepnessParameters) -> float:

@@ -97,19 +97,23 @@ class RecordedLayer(NamedTuple):
     Attributes
     ----------
     costs : (V,) float16
-        In the layer's own unit; inf is forbidden.
+        inf is forbidden.
+    unit : str
+        Of the costs; empty = none, as in recordings of earlier versions.
     """
 
     name: str
     costs: NDArray[np.float16]
+    unit: str = ""
 
 
 def layer_arrays(layers: list[RecordedLayer]) -> dict[str, Any]:
-    """All layers as arrays for a file: names (n,), costs (n, V)."""
+    """All layers as arrays for a file: names and units (n,), costs (n, V)."""
     if not layers:
         return {}
     return {
         "layer_names": np.array([layer.name for layer in layers]),
+        "layer_units": np.array([layer.unit for layer in layers]),
         "layer_costs": np.array([one.costs for one in layers]),
     }
 
@@ -118,7 +122,9 @@ def layers_from(arrays: dict[str, Any]) -> list[RecordedLayer]:
     """Read what ``layer_arrays`` made; older recordings may have none."""
     if "layer_names" not in arrays:
         return []
-    return [RecordedLayer(*one) for one in zip(arrays["layer_names"].tolist(), arrays["layer_costs"], strict=True)]
+    names = arrays["layer_names"].tolist()
+    units = arrays["layer_units"].tolist() if "layer_units" in arrays else [""] * len(names)
+    return [RecordedLayer(*one) for one in zip(names, arrays["layer_costs"], units, strict=True)]
 
 
 def add_if_changed(meshes: list[RecordedMesh], time: float, view: MeshView) -> None:

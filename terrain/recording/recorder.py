@@ -129,7 +129,9 @@ class Recorder:
             view = look(name) if self.map_budget > 0 else None
             if view is not None:
                 self.map_budget -= view.costs.size
-                self.layers.append(RecordedLayer(name, half_precision(view.costs)))
+                self.layers.append(
+                    RecordedLayer(name, half_precision(view.costs), view.unit if isinstance(view, MeshView) else "")
+                )
 
     def tracked(self, time: float, look: Callable[[], Iterable[TrackedObject]]) -> None:
         """Add the objects that the robot knows of now, in the map, unless that was looked at just before.

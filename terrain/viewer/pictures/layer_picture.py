@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray
-from terrain.recording.recorded_maps import RecordedLayer
 from terrain.recording.recording import Recording
 from terrain.viewer.pictures.colours import PLANNED, cost_colours_up_to
+from terrain.viewer.pictures.layer_scale import end_of_scale, range_text, shown_layers
 from terrain.viewer.pictures.picture import DOTS_PER_INCH, Extent, ViewerMissing, draw_line, draw_marks, png_bytes
 from terrain.viewer.pictures.raster import paint_triangles
 
@@ -22,8 +22,6 @@ PIXELS = 640  # along the longer side of a panel
 PANEL = 3.6  # inches
 MOST_COLUMNS = 4
 PLAN_WIDTH = 1.6
-ABOVE_SCALE = 0.01
-"""Share of the costs beyond the end of a panel's scale, so that a single spike does not make all others pale."""
 
 
 def has_layers(recording: Recording) -> bool:
@@ -49,8 +47,7 @@ def layer_picture_png(recording: Recording, names: Sequence[str] = ()) -> bytes:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise ViewerMissing(f"pictures need matplotlib: pip install 'mbf-flex[sim]' ({error})") from error
-    by_name = {layer.name: layer for layer in recording.layers}
-    shown = [by_name[name] for name in names if name in by_name] or [one for one in recording.layers if _differs(one)]
+    shown = shown_layers(recording.layers, names)
     columns = min(len(shown), MOST_COLUMNS) or 1
     rows = -(-len(shown) // columns) or 1
     surface = recording.meshes[0]
@@ -61,14 +58,14 @@ def layer_picture_png(recording: Recording, names: Sequence[str] = ()) -> bytes:
     FigureCanvasAgg(figure)
     for number, layer in enumerate(shown):
         axes = figure.add_subplot(rows, columns, number + 1)
-        top = _end_of_scale(layer)
+        top = end_of_scale(layer)
         pixels = painted(surface.vertices, surface.faces, layer.costs.astype(np.float64), top, extent)
         axes.imshow(pixels, extent=extent, interpolation="nearest", zorder=1)
         for _, points in recording.paths[-1:]:
             draw_line(axes, points, PLANNED, PLAN_WIDTH, zorder=5)
         draw_marks(axes, None, recording.goals)
         axes.set(xlim=extent[:2], ylim=extent[2:], xticks=[], yticks=[])
-        axes.set_title(f"{layer.name}, 0 to {top:.2g}", loc="left", fontsize=9, parse_math=False)
+        axes.set_title(f"{layer.name}, {range_text(layer)}", loc="left", fontsize=9, parse_math=False)
     return png_bytes(figure)
 
 
@@ -98,15 +95,3 @@ def painted(
     colours = cost_colours_up_to(top, costs[faces].mean(axis=1))
     paint_triangles(places[faces], colours, pixels, np.zeros((height, width), dtype=np.float32))
     return pixels
-
-
-def _differs(layer: RecordedLayer) -> bool:
-    return bool((layer.costs != layer.costs[:1]).any())
-
-
-def _end_of_scale(layer: RecordedLayer) -> float:
-    """What all but ``ABOVE_SCALE`` of the finite costs are below; the highest if that is 0, 1 without any."""
-    finite = layer.costs[np.isfinite(layer.costs)].astype(np.float64)
-    if not len(finite):
-        return 1.0
-    return float(np.quantile(finite, 1.0 - ABOVE_SCALE)) or float(finite.max()) or 1.0

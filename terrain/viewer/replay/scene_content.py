@@ -29,6 +29,7 @@ from terrain.viewer.pictures.shading import LIGHT
 from terrain.viewer.pictures.shapes import marks
 from terrain.viewer.pictures.storeys import storeys
 from terrain.viewer.replay.bodies import actor_parts, robot_parts
+from terrain.viewer.replay.cost_layers import packed_layers
 from terrain.viewer.replay.packing import Packer
 from terrain.viewer.replay.world_mesh import WorldMesh, world_mesh
 from terrain.viewer.scene import route_of, scan_hold, wheel_angles
@@ -80,6 +81,7 @@ def scene_content(packer: Packer, world: Recording, robots: Mapping[Looks, Recor
         "ending": well_formed(world.verdict.title),
         "size": mesh.size.tolist(),
         "world": _packed_world(packer, mesh),
+        "layers": packed_layers(packer, world),
         "storeys": [round(floor - float(mesh.origin[2]), 3) for floor in storeys(world.ground)],
         **_route(world, mesh),
         **_looks(mesh),

@@ -11,12 +11,13 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.view import MeshView
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.metrics import measure
-from terrain.recording.recorded_maps import RecordedLayer
+from terrain.recording.recorded_maps import RecordedLayer, layer_arrays, layers_from
 from terrain.recording.recorder import MAP_PERIOD, Recorder
 from terrain.recording.recording import Recording, RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.colours import WALL, cost_colours_up_to
 from terrain.viewer.pictures.layer_picture import NOWHERE, layer_picture_png, painted
+from terrain.viewer.pictures.layer_scale import range_text
 from terrain.viewer.reports.report import report_html
 from terrain.worlds.heightfield import Heightfield
 
@@ -25,8 +26,11 @@ CORNERS = np.array([[0.0, 0.0, 0.1], [2.0, 0.0, 0.2], [0.0, 1.0, 0.3]])
 FACES = np.array([[0, 1, 2]], np.int32)
 
 
+UNITS = {"slope": "rad"}
+
+
 def look(name=""):
-    return MeshView(CORNERS, FACES, np.array(COSTS[name or "safe"], np.float32))
+    return MeshView(CORNERS, FACES, np.array(COSTS[name or "safe"], np.float32), UNITS.get(name, ""))
 
 
 def a_recorder(**changes):
@@ -49,6 +53,17 @@ def test_layers_are_recorded_with_the_first_look_and_come_back_from_the_file(tmp
     assert [layer.name for layer in layers] == list(COSTS)
     for layer in layers:
         np.testing.assert_allclose(layer.costs, COSTS[layer.name], atol=1e-3)
+        assert layer.unit == UNITS.get(layer.name, "")
+
+
+def test_a_recording_of_an_earlier_version_has_layers_without_units(recording):
+    arrays = layer_arrays(recording.layers)
+    del arrays["layer_units"]
+    assert [layer.unit for layer in layers_from(arrays)] == ["", "", ""]
+
+
+def test_what_colours_stand_for_is_said_with_the_unit(recording):
+    assert [range_text(layer) for layer in recording.layers] == ["0 to 0.99", "0 to 0.2 rad", "0 to 1"]
 
 
 def test_layers_are_recorded_as_far_as_the_budget_of_a_run_goes():

@@ -37,6 +37,7 @@ class Replay {
     this.scene.storeys.forEach((height, k) => storeys.add(new Option('storey ' + k, k)));
     storeys.add(new Option('all storeys', 'all'));
     storeys.addEventListener('change', () => this.showStorey(storeys.value));
+    this.colours = new Colours(this.world, this.scene, () => { this.dirty = true; });
     robots.hidden = this.bodies.robots.length < 2;
     this.bodies.robots.forEach((robot, k) => robots.add(new Option(robot.name, k)));
     robots.addEventListener('change', () => { this.chosen = Number(robots.value); this.dirty = true; });
@@ -69,6 +70,7 @@ class Replay {
       Home: () => player.seek(0), End: () => player.seek(player.end), n: () => player.step(1), p: () => player.step(-1),
       1: () => this.camera.show('overview'), 2: () => this.camera.show('follow'), 3: () => this.camera.show('above'),
       '[': () => this.nextStorey(-1), ']': () => this.nextStorey(1), r: () => this.nextRobot(),
+      c: () => this.colours.next(),
       '+': () => player.faster(1), '-': () => player.faster(-1), i: () => this.togglePanel(), '?': showKeys,
       Escape: () => { document.getElementById('keys').hidden = true; },
     };

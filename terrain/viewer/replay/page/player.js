@@ -3,7 +3,7 @@ const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
 const LONGEST = 60;  // s that a run takes at the speed it begins with
 const KEYS = [['space', 'play, pause'], ['← →', '1 s back, ahead; with shift 10 s'], ['home end', 'begin, end'],
   ['N P', 'next, previous incident'], ['1 2 3', 'overview, follow, above'], ['[ ]', 'storeys shown'],
-  ['R', 'next robot'], ['+ −', 'speed'], ['I', 'panel'], ['?', 'this list'],
+  ['R', 'next robot'], ['C', 'colours of the ground'], ['+ −', 'speed'], ['I', 'panel'], ['?', 'this list'],
   ['drag', 'turn; right button or two fingers: shift'], ['wheel, pinch', 'zoom']];
 
 class Player {

@@ -30,22 +30,40 @@ const WORLD_VERTEX = `#version 300 es
 layout(location = 0) in vec3 fraction;
 layout(location = 1) in float paint;
 layout(location = 2) in vec3 smoothNormal;
+layout(location = 3) in float costStep;
 uniform mat4 view;
 uniform vec3 size;
+uniform float steps;
 out vec3 at;
 out vec3 normal;
+out vec3 cost;  // share of the scale, forbidden, not on the map
 flat out float kind;
-void main() { at = fraction * size; normal = smoothNormal; kind = paint; gl_Position = view * vec4(at, 1.0); }`;
+void main() {
+  at = fraction * size; normal = smoothNormal; kind = paint; gl_Position = view * vec4(at, 1.0);
+  cost = vec3(min(costStep / max(steps, 1.0), 1.0), abs(costStep - steps - 1.0) < 0.5, costStep > steps + 1.5);
+}`;
 
 const WORLD_FRAGMENT = LIT + `
 uniform vec3 paints[4];
 uniform vec3 slopes[5];
 uniform float stops[5];
 uniform float contour;
+uniform float steps;
+uniform vec3 forbidden;
+uniform vec3 nowhere;
 in vec3 at;
 in vec3 normal;
+in vec3 cost;
 flat in float kind;
 out vec4 colour;
+// A face is forbidden, or not on the map, where one of its corners is; as in the picture of the layers.
+vec3 costColour() {
+  if (cost.z > 1e-4) return nowhere;
+  if (cost.y > 1e-4) return forbidden;
+  vec3 found = slopes[0];
+  for (int k = 1; k < 5; k++) found = mix(found, slopes[k], clamp(4.0 * cost.x - float(k - 1), 0.0, 1.0));
+  return found;
+}
 vec3 slopeColour(float angle) {
   vec3 found = slopes[0];
   for (int k = 1; k < 5; k++) found = mix(found, slopes[k], clamp((angle - stops[k - 1]) / (stops[k] - stops[k - 1]), 0.0, 1.0));
@@ -59,8 +77,9 @@ void main() {
   if (dot(rounded, face) < 0.0) rounded = -rounded;
   vec3 shown = ground && dot(rounded, face) > 0.93 ? rounded : face;
   vec3 paint = paints[int(kind + 0.5)];
+  if (steps > 0.0 && ground) paint = costColour();
+  else if (kind < 0.5) paint = slopeColour(degrees(acos(clamp(abs(shown.z), 0.0, 1.0))));
   if (kind < 0.5) {
-    paint = slopeColour(degrees(acos(clamp(abs(shown.z), 0.0, 1.0))));
     if (contour > 0.0) {
       float height = at.z / contour, wide = fwidth(height);
       float line = 1.0 - smoothstep(0.0, 1.2 * wide, abs(fract(height + 0.5) - 0.5));

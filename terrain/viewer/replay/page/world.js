@@ -8,6 +8,7 @@ class World {
     this.drawing = drawing;
     this.size = scene.size;
     const vertices = arrays[scene.world.vertices], paints = arrays[scene.world.paints];
+    this.vertexCount = paints.length;
     this.levels = [];
     const lists = scene.world.levels.map(([cell, number]) => [cell, arrays[number]]);
     const indices = new Uint32Array(lists.reduce((sum, [, list]) => sum + list.length, 0));
@@ -22,14 +23,31 @@ class World {
       [0, 3, gl.UNSIGNED_SHORT, true, 0], [1, 1, gl.UNSIGNED_BYTE, false, 6], [2, 3, gl.BYTE, true, 8]]);
     drawing.buffer(indices, gl.ELEMENT_ARRAY_BUFFER);
     gl.bindVertexArray(null);
+    this.layers = scene.layers.list.map(([name, range, number]) => ({name, range, steps: arrays[number]}));
+    this.steps = scene.layers.steps;
     this.program = drawing.program(WORLD_VERTEX, WORLD_FRAGMENT);
     this.depth = drawing.program(WORLD_VERTEX, DEPTH_FRAGMENT);
     this.shadows = drawing.shadowMap();
     this.shadowCut = null;
     this.looks = {size: scene.size, light: scene.light, paints: scene.paints.flat(), slopes: scene.slopes.flat(),
-      stops: scene.stops, contour: scene.contour};
+      stops: scene.stops, contour: scene.contour, steps: 0, forbidden: scene.layers.forbidden, nowhere: scene.layers.nowhere};
     const middle = scene.size.map(length => length / 2), half = Math.hypot(...middle);
     this.toLight = product(box(half, 0, 4 * half), lookingAt(plus(middle, scene.light, 2 * half), middle, [0, 0, 1]));
+  }
+
+  // Colours the ground by the costs of a layer, by its slopes without one.
+  colourBy(layer) {
+    const gl = this.drawing.gl;
+    this.looks.steps = layer ? this.steps : 0;
+    if (!layer) return;
+    const all = new Uint8Array(this.vertexCount).fill(this.steps + 2);  // walls are on no map
+    all.set(layer.steps);
+    this.costs = this.costs || gl.createBuffer();
+    gl.bindVertexArray(this.array);
+    this.drawing.fill(this.costs, all);
+    gl.enableVertexAttribArray(3);
+    gl.vertexAttribPointer(3, 1, gl.UNSIGNED_BYTE, false, 1, 0);
+    gl.bindVertexArray(null);
   }
 
   // The coarsest level that looks like the finest from this eye.
