@@ -27,6 +27,7 @@ from numba import config, njit
 from numba.core import event
 
 from mbf_abstract.compiling.compilation import CompilerClock
+from mbf_abstract.compiling.shared_cache import share_cache
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True}
 """Kernels run without the interpreter lock; none is called from C, so the wrapper for that is not compiled."""
@@ -53,15 +54,20 @@ def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
     """
     if config.DISABLE_JIT:
         return function
-    cache = _cache_folder(_folder_of_kernels(Path(inspect.getfile(function))))
+    cache = cache_folder(Path(inspect.getfile(function)))
     if cache is None:
         return njit(**_OPTIONS, **options)(function)
     with _deciding_where:  # numba asks for the folder once, when it wraps the function
         usual, config.CACHE_DIR = config.CACHE_DIR, str(cache)
         try:
-            return njit(cache=True, **_OPTIONS, **options)(function)
+            return share_cache(njit(**_OPTIONS, **options)(function), function)
         finally:
             config.CACHE_DIR = usual
+
+
+def cache_folder(file: Path) -> Path | None:
+    """Return the folder for the machine code of a file's kernels, as all around it are now; None: there is none."""
+    return _cache_folder(_folder_of_kernels(file))
 
 
 def _folder_of_kernels(file: Path) -> Path:

@@ -24,9 +24,13 @@ from terrain.commands.scenarios import scenarios
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from contextlib import AbstractContextManager
 
     from terrain.scenarios.scenario import Scenario
+    from terrain.session.run_options import Progress
     from terrain.session.runner import RunOptions, RunResult
+
+SERVERS = "mbf.servers"
 
 
 def register(app: typer.Typer) -> None:
@@ -169,9 +173,24 @@ def _driven(scenario: str, map_file: Path | None, options: RunOptions, over_ros:
             from terrain.commands.robot_on_ros import require_one_robot
 
             require_one_robot(loaded, scenario_file(scenario))
-        return run_scenario(on_other_map(loaded), options)
+        with _compiling_ahead(options.backend or loaded.backend) as look_after:
+
+            def on_progress(progress: Progress) -> None:
+                look_after()
+                options.on_progress(progress)
+
+            return run_scenario(on_other_map(loaded), replace(options, on_progress=on_progress))
     except (ConfigError, ServerError) as error:
         raise _all_that_is_wrong(error, scenario, options, on_other_map) from error
+
+
+def _compiling_ahead(backend: str) -> AbstractContextManager[Callable[[], None]]:
+    """Compile what a first start with a backend needs in a second process, where its package names that."""
+    from mbf_abstract.compiling.ahead import compiling_ahead
+    from mbf_abstract.config.installed_plugins import installed_points
+
+    packages = [point.module.partition(".")[0] for point in installed_points(SERVERS) if point.name == backend]
+    return compiling_ahead(f"{packages[0]}.kernels.first_start" if packages else "")
 
 
 def _all_that_is_wrong(

@@ -1,0 +1,67 @@
+"""Machine code on disk that several processes add to: one at a time writes, so that no index names another one's code.
+
+numba chooses the name of a data file by its index and then writes both. Two processes that compile one kernel for
+different types at the same moment would give both the same name, and one would run the code of the other.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any
+
+from numba.core.caching import FunctionCache
+
+if sys.platform != "win32":  # processes there write without waiting for each other
+    import fcntl
+
+CAN_LOCK = sys.platform != "win32"
+
+
+class SharedCache(FunctionCache):  # type: ignore[misc]
+    """numba's own cache of a function, which waits while another process writes to the same folder."""
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save the machine code for one signature."""
+        with locked(Path(self.cache_path) / ".lock"):
+            super().save_overload(sig, data)
+
+
+def share_cache(dispatcher: Any, function: Callable[..., Any]) -> Any:
+    """Let a dispatcher of numba keep its code in a ``SharedCache``, as its ``enable_caching`` does in numba's own."""
+    dispatcher._cache = SharedCache(function)
+    return dispatcher
+
+
+@contextmanager
+def locked(file: Path) -> Iterator[None]:
+    """Hold the lock of a file; where the file system has none, go on without."""
+    stream: IO[bytes] | None = None
+    with suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        stream = file.open("ab")
+        if sys.platform != "win32":
+            fcntl.flock(stream, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        if stream is not None:
+            stream.close()
+
+
+def try_to_lock(file: Path) -> IO[bytes] | None:
+    """Take the lock of a file without waiting; it is held until what is returned is closed. None: another has it."""
+    if sys.platform == "win32":
+        return None
+    try:
+        stream = file.open("ab")
+    except OSError:
+        return None
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        stream.close()
+        return None
+    return stream
