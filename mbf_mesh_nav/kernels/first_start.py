@@ -52,7 +52,7 @@ def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
         (unit_face_normals, (rows, face_rows)),
         (unit_vertex_normals, (rows, numbers, numbers)),
         (show_changes, (listed, listed, costs, costs, _fixed(flags), 0.0, numbers, floats, flags, floats)),
-        (settle_footprints, (surface, reals, _example(np.int64), 0.0, 0.0, True)),
+        (settle_footprints, (surface, reals, _example(np.int64), 0.0, 0.0, True, reals)),
         (inclinations, (points,)),
         (mean_edge_angles, (points, listed, listed)),
         (neighbourhood_means, (reals, points, listed, listed, 0.0)),

@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 FIRST_START = """
 from numba import typeof
 
@@ -25,6 +27,7 @@ for kernel, arguments in kernels():
 """
 
 
+@pytest.mark.timeout(900)  # it may have to compile everything, on a busy machine
 def test_every_kernel_that_is_compiled_ahead_is_used_by_a_start_with_just_these_types():
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-c", FIRST_START]
