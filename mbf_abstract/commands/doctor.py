@@ -22,7 +22,7 @@ from mbf_abstract.config.installed_plugins import DISTRIBUTION
 
 NEEDED = (*("numpy", "scipy", "numba", "trimesh", "networkx", "rtree", "yaml", "pydantic", "rich", "py_trees", "PIL"),)
 MESH_FILES = ("h5py", "lxml", "collada")
-POINT_CLOUDS = ("laspy", "lazrs")
+POINT_CLOUDS = ("laspy", "lazrs", "pyproj")
 SIMULATION = ("pybullet", "matplotlib", "viser", "mcap", "mcap_protobuf", "foxglove_schemas_protobuf")
 DISTRIBUTIONS = {
     "yaml": "pyyaml",
@@ -74,7 +74,7 @@ def examine() -> Iterator[Finding]:
     for name in MESH_FILES:
         yield _package(name, "only for meshes in .h5 and .dae files: pip install 'mbf-flex[mesh-files]'", optional=True)
     for name in POINT_CLOUDS:
-        yield _package(name, "only for .las and .laz in mbf map build: pip install 'mbf-flex[maps]'", optional=True)
+        yield _package(name, "only for .las, .laz, --crs of mbf map build: pip install 'mbf-flex[maps]'", optional=True)
     yield _package("websockets", "only for mbf bridge serve: pip install 'mbf-flex[bridge]'", optional=True)
     yield _package("rosbags", "only for mbf bag: pip install 'mbf-flex[bags]'", optional=True)
     yield _package("gymnasium", "only for terrain.learning: pip install 'mbf-flex[gym]'", optional=True)

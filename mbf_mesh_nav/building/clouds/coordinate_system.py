@@ -1,25 +1,21 @@
-"""Names of coordinate systems, by their form: nothing is transformed, so no register of them is needed.
+"""Names of coordinate systems that users give, checked by their form and by the register in ``map_projections``.
 
-Forms: a code of EPSG, well-known text (OGC 01-009 and ISO 19162) and the strings of the library PROJ. Refused are
-what has none of the forms, a zone of UTM that does not exist, and systems in degrees or around the earth's centre: of
-codes the usual ones. Whether a code or a projection exists is not checked.
+Forms: a code of EPSG, well-known text (OGC 01-009 and ISO 19162) and the strings of the library PROJ. Refused are what
+has none of the forms, what PROJ does not know, and systems that no map is in: in degrees, around the earth's centre, of
+heights alone. Nothing is transformed.
 """
 
 from __future__ import annotations
 
 import re
 
+from mbf_mesh_nav.building.clouds.map_projections import registered
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 LONGEST_NAME = 200
 """Characters of the name of a coordinate system, which is kept in the header of a map file."""
 LEAST_CODE, GREATEST_CODE = 1024, 32766
 """Codes that EPSG gives."""
-DEGREES = (4171, 4258, 4267, 4269, 4277, 4283, 4314, 4326, 4490, 4612, 4617, 4674, 4937, 4979, 6318, 6668, 7844)
-"""Codes of the usual systems in degrees, such as ETRS89, NAD83 and WGS 84, in two and three dimensions."""
-GEOCENTRIC = (4936, 4978)
-"""Codes of the usual systems with the earth's centre as origin: ETRS89 and WGS 84."""
-
 CODE = re.compile(r"(?:EPSG:|urn:ogc:def:crs:EPSG:[\d.]*:)(\d+)(?:\+(\d+))?", re.IGNORECASE)
 """Of a whole system, or of its horizontal and its vertical part."""
 PROJ_STRING = re.compile(r"(?:\+\w+(?:=[^\s+]\S*)?\s+)*\+(?:proj|init)=\w\S*(?:\s+\+\w+(?:=[^\s+]\S*)?)*")
@@ -56,8 +52,8 @@ def given_system(text: str) -> str:
     Raises
     ------
     MeshError
-        The text has none of the forms, is too long or names a zone of UTM that there is not; or it is a system in
-        degrees or around the earth's centre, in which no map can be.
+        The text has none of the forms or is too long; or there is no such system, or it is in degrees, around the
+        earth's centre or of heights alone, in which no map can be; or pyproj is not installed.
     """
     given = text.strip()
     if not given:
@@ -66,8 +62,7 @@ def given_system(text: str) -> str:
     if match := CODE.fullmatch(given):
         codes = [int(code) for code in match.groups() if code]
         if all(LEAST_CODE <= code <= GREATEST_CODE for code in codes):
-            name, is_degrees = f"EPSG:{'+'.join(map(str, codes))}", codes[0] in DEGREES
-            is_geocentric = codes[0] in GEOCENTRIC
+            name = f"EPSG:{'+'.join(map(str, codes))}"
     elif WELL_KNOWN_TEXT.fullmatch(given) and given.count("[") == given.count("]"):
         name, is_degrees = name_of_text(given), DEGREES_OF_TEXT.match(given) is not None
     elif len(given) <= LONGEST_NAME and given.isascii() and given.isprintable() and PROJ_STRING.fullmatch(given):
@@ -76,11 +71,14 @@ def given_system(text: str) -> str:
         _refuse_zone(given)
     if not name:
         raise MeshError("point cloud", [f"crs: {EXPECTED}, got {given!r:.60}"])
-    if is_degrees:
+    system = None if is_degrees or is_geocentric else registered(name if name.startswith("EPSG:") else given)
+    if is_degrees or (system is not None and system.is_geographic):
         raise MeshError("point cloud", [f"crs: {name} is in degrees, a map is in metres; project the points first"])
-    if is_geocentric:
+    if is_geocentric or (system is not None and system.is_geocentric):
         text = f"crs: {name} has its origin in the earth's centre, where z is not up; project the points first"
         raise MeshError("point cloud", [text])
+    if system is not None and system.is_vertical and not system.is_compound:
+        raise MeshError("point cloud", [f"crs: {name} is of heights alone; give the one of x and y, or both as A+B"])
     return name
 
 

@@ -16,6 +16,7 @@ from mbf_abstract.config.bounded_files import special_file
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.building.clouds.coordinate_system import given_system
 from mbf_mesh_nav.building.clouds.las_points import read_las_points
+from mbf_mesh_nav.building.clouds.map_projections import contradicts
 from mbf_mesh_nav.building.clouds.mesh_points import MESH_ENDINGS, read_mesh_points
 from mbf_mesh_nav.building.clouds.octomap_points import read_octomap_points
 from mbf_mesh_nav.building.clouds.pcd_points import read_pcd_points
@@ -110,7 +111,7 @@ def read_clouds(
     ------
     MeshError
         A file cannot be read, holds points that are not finite, or coordinates that are no metres; or the files have
-        different units or coordinate systems, or ``crs`` is none.
+        different units or coordinate systems, or ``crs`` is none or contradicts what a file states.
     """
     system = given_system(crs)
     if not files:
@@ -135,8 +136,12 @@ def read_clouds(
         raise MeshError("point cloud", [f"the files state different units ({text}); give one unit for all"])
     if len(systems) > 1 and not system:
         text = ", ".join(f"{name} {system}" for system, name in systems.items())
-        hint = "Transform them to one, or give the right one with --crs"
+        hint = "Transform them to one"
         raise MeshError("point cloud", [f"the files state different coordinate systems ({text})"], hint)
+    given = system if system.startswith("EPSG:") else crs.strip()
+    if against := [f"{name} {one}" for one, name in systems.items() if system and contradicts(one, given)]:
+        text = f"the files state another coordinate system ({', '.join(against)}) than is given ({system})"
+        raise MeshError("point cloud", [text], "Leave it out, or transform the points, or correct what the files state")
     notes += [
         f"{name} states {one}, the map keeps {system} as given"
         for one, name in systems.items()

@@ -2,6 +2,7 @@
 
 import os
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -295,10 +296,55 @@ def test_files_of_different_coordinate_systems_are_refused(tmp_path):
         MeshError, match=r"systems \(25832.las EPSG:25832, 25833.las EPSG:25833\). Transform them to one"
     ):
         read_clouds(files)
-    assert read_clouds(files, crs="EPSG:25832").crs == "EPSG:25832"
-    assert read_clouds(files, crs="EPSG:25832").notes == (
-        "25833.las states EPSG:25833, the map keeps EPSG:25832 as given",
-    )
+
+
+ZONE_32 = 'PROJCS["ETRS89 / UTM zone 32N",UNIT["metre",1]]'
+
+
+@pytest.mark.parametrize(
+    ("text", "given"),
+    [
+        ('PROJCS["a",UNIT["metre",1],AUTHORITY["EPSG","25832"]]', "EPSG:25833"),
+        ('PROJCS["a",UNIT["metre",1],AUTHORITY["EPSG","25832"]]', "EPSG:25833+7837"),
+        ('PROJCS["a",UNIT["metre",1],AUTHORITY["EPSG","25832"]]', "EPSG:31466"),
+        ('PROJCS["a",UNIT["metre",1],AUTHORITY["EPSG","25832"]]', "EPSG:23032"),
+        ('PROJCS["a",UNIT["metre",1],AUTHORITY["EPSG","25832"]]', "+proj=utm +zone=31 +ellps=GRS80"),
+        (ZONE_32, "EPSG:25833"),
+    ],
+)
+def test_a_given_coordinate_system_that_contradicts_that_of_a_file_is_refused(tmp_path, text, given):
+    file = write_las(tmp_path / "survey.las", POINTS, well_known_text=text)
+    expected = r"the files state another coordinate system \(survey.las .*\) than is given .*Leave it out, or transform"
+    with pytest.raises(MeshError, match=f"(?s){expected}"):
+        read_clouds([file], crs=given)
+
+
+@pytest.mark.parametrize("given", ["EPSG:25832", "EPSG:25832+7837", "EPSG:32632", "+proj=utm +zone=32 +ellps=GRS80"])
+@pytest.mark.parametrize("text", [ZONE_32, 'PROJCS["zone 32",UNIT["metre",1]]'])
+def test_a_given_coordinate_system_of_the_same_places_is_kept_with_a_note(tmp_path, text, given):
+    cloud = read_clouds([write_las(tmp_path / "survey.las", POINTS, well_known_text=text)], crs=given)
+    assert cloud.crs == given
+    assert [note.split(",")[1] for note in cloud.notes] == [f" the map keeps {given} as given"]
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ("EPSG:1164", "crs: the EPSG register has no such system, got 'EPSG:1164'"),
+        ("+proj=mercury +lat_0=3", "crs: PROJ knows no such system, got '+proj=mercury +lat_0=3'"),
+        ('PROJCS["a grid",UNIT["metre",1]]', "crs: PROJ knows no such system, got"),
+        ("EPSG:7837", "crs: EPSG:7837 is of heights alone"),
+    ],
+)
+def test_a_coordinate_system_that_does_not_exist_is_refused(given, text):
+    with pytest.raises(MeshError, match=re.escape(text)):
+        given_system(given)
+
+
+def test_a_coordinate_system_that_cannot_be_checked_names_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyproj", None)
+    with pytest.raises(MeshError, match=r"needs pyproj: pip install 'mbf-flex\[maps\]'"):
+        given_system("EPSG:25832")
 
 
 @pytest.mark.parametrize(
@@ -332,6 +378,7 @@ def test_what_is_no_coordinate_system_is_refused_before_a_file_is_read(tmp_path,
     [
         "EPSG:4326",
         "EPSG:7844",
+        "EPSG:4903",
         "+proj=longlat +datum=WGS84",
         'GEOGCS["a globe",UNIT["degree",0.017]]',
         'COMPD_CS["a globe + heights",GEOGCS["a globe",UNIT["degree",0.017]],VERT_CS["heights",UNIT["metre",1]]]',
