@@ -74,12 +74,16 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
         request: RecoveryRequest,
         velocity: Callable[[Pose], Twist | RecoveryResult],
         finished: Callable[[Pose], bool] = lambda _: False,
+        obstacle_ahead: Callable[[Pose, Twist], str] | None = None,
     ) -> RecoveryResult:
         """Send ``velocity(pose)`` each period until ``finished(pose)``, a result instead of a velocity, or another end.
+
+        What a motion would touch is answered by ``obstacle_ahead``, by default that of the recovery.
 
         While the map is stale the robot stands and ``velocity`` is not called. One refused command does not end the
         motion, as the goal may be paused and the sleep lasts until it is resumed; two refusals in a row do.
         """
+        obstacle_ahead = obstacle_ahead or self.obstacle_ahead
         motion, token, limit = request.motion, request.cancel_token, self.parameters.time_limit
         deadline, refusals, last = self.clock.now() + limit, 0, Twist()
         while not token.cancelled:
@@ -96,7 +100,7 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
             here, measured = self.on_map(pose), motion.velocity()
             moving = last if measured == Twist() else measured  # a robot without odometry measures none
             share, reason, _ = self.navigation_map.safe_share(here, moving, answer, self.clock.now())
-            if obstacle := reason if share == 0.0 else self.obstacle_ahead(pose, answer):
+            if obstacle := reason if share == 0.0 else obstacle_ahead(pose, answer):
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, obstacle)
             refusals, last = 0 if motion.send(slower(answer, share)) else refusals + 1, answer
             if refusals > 1 and not token.cancelled:

@@ -127,6 +127,13 @@ class NavigationMap(ABC):
         obstacle unless the motion leads deeper into it.
         """
 
+    def obstacle_on_track(self, pose: Pose, command: Twist, duration: float) -> str:
+        """As ``obstacle_ahead``, for a robot that drives back along its own track.
+
+        Ground that only costs too much is no obstacle there: the robot has just driven over it. What is lethal is one.
+        """
+        return self.obstacle_ahead(pose, command, duration)
+
     @abstractmethod
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
         """Offset [m] from ``pose`` to the nearest obstacle, along the axes of the map; None if none is ``within`` [m].

@@ -3,9 +3,9 @@
 When to use: slopes near the robot's limits. It may drive straight up what it must not cross sideways, and it does not
 fall into a ditch narrower than its wheelbase that ``steepness`` forbids. When not: flat floors, tracked or legged
 robots, and meshes coarser than half the footprint. It replaces the guard of the border: where a wheel has no support,
-the heading is not allowed. Planners that know no headings may come with any. ``preferred_headings`` keeps them to
-ground that allows most: elsewhere the cost is 1, which a planner that looks at headings enters with a higher
-``cost_limit``. ``needed_headings`` closes such ground to all planners.
+the heading is not allowed. Planners that know no headings look for a path that comes with allowed ones, a bounded
+number of times. ``preferred_headings`` keeps them to ground that allows most: elsewhere the cost is 1, which a planner
+that looks at headings enters with a higher ``cost_limit``. ``needed_headings`` closes such ground to all planners.
 Rule: the four wheels stand on the surface, the body takes their plane of least squares (``footprint_settling``); a
 ``rigid`` one stands on three of them, which on a skew ledge is some degrees steeper, and counts the worse stance. A
 heading is allowed if roll, pitch up and pitch down keep their limits, the slope in every direction stays

@@ -23,7 +23,7 @@ from mbf_mesh_nav.mesh.topology import MeshTopology
 from mbf_mesh_nav.mesh.turning import pivots, slope_at, swept_obstacle
 
 FORBIDDEN_COST = 1.0
-"""Ground whose cost reaches this is not driven onto in a recovery."""
+"""Ground whose cost reaches this is not driven onto in a recovery, but along the robot's own track."""
 
 
 class SnapshotAnswers(OutlinedMap):
@@ -85,13 +85,20 @@ class SnapshotAnswers(OutlinedMap):
 
         A motion that turns about a place within the robot's outline is a turn on the spot, even if it creeps.
         """
+        return self._obstacle(pose, command, duration, FORBIDDEN_COST)
+
+    def obstacle_on_track(self, pose: Pose, command: Twist, duration: float) -> str:
+        """As ``obstacle_ahead``, where only lethal ground is forbidden."""
+        return self._obstacle(pose, command, duration, np.inf)
+
+    def _obstacle(self, pose: Pose, command: Twist, duration: float, cost_limit: float) -> str:
         place = self.locate_one(pose.position, SURFACE_DISTANCE)
         if place is None:
             return f"the robot is more than {SURFACE_DISTANCE:g} m from the surface"
         turns = pivots(command, self.robot_reach)
         if turns and (slope := slope_at(self.topology, place)) > self.max_turning_slope:
             return f"the ground slopes {slope:.2f} rad, turning is allowed up to {self.max_turning_slope:g} rad"
-        ranks = self.snapshot().traversability_rank(FORBIDDEN_COST)
+        ranks = self.snapshot().traversability_rank(cost_limit)
         if turns and self.footprint:
             swept = swept_obstacle(self.topology, ranks, place, pose, command, duration, self.footprint)
             if swept:

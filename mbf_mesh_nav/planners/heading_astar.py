@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -50,6 +51,7 @@ class HeadingAStarPlanner(SurfacePlanner):
 
     Parameters = HeadingAStarParameters
     parameters: HeadingAStarParameters
+    knows_headings: ClassVar[bool] = True
 
     _tilt_at_ends = ""
     _limits: FootprintLimits | NormalLimits | None = None

@@ -19,6 +19,7 @@ from mbf_mesh_nav.search.leg_search import (
     NO_TARGETS,
     Leg,
     LegQuery,
+    propagate_from,
     search_graph,
     seeded_arrays,
     threshold_step,
@@ -64,6 +65,12 @@ class RepairingPlanner(SurfacePlanner):
             return None
         self._wave = wave
         return vertex_path_leg(self.mesh_map, query, wave.distances, wave.predecessors, rooted_at_goal=True)
+
+    def find_other_leg(self, query: LegQuery) -> Leg | None:
+        """Search from the start; the remembered wave is of the map as it is."""
+        search = self.mesh_map, query.snapshot, query.blocked, query.start, query.cancel_flag, query.goal
+        distances, predecessors, finished = propagate_from(*search, guided=True)
+        return vertex_path_leg(self.mesh_map, query, distances, predecessors) if finished else None
 
     def _changes_since(self, wave: RememberedWave, query: LegQuery) -> IntArray | None:
         """Vertices that changed since the wave; None if it leads elsewhere, or the changes are not remembered."""

@@ -24,6 +24,13 @@ from mbf_mesh_nav.search.drive_graph import DriveGraph
 NO_CHASSIS = Chassis(1.0, 1.0, False, 1.0, 1.0, 1.0, math.inf)
 
 
+def chassis_of(layer: TiltLayer) -> Chassis:
+    """Measures and limits of a tilt layer, as they are now."""
+    settings = layer.parameters
+    roll, up, down = (math.tan(limit) for limit in layer.limits())
+    return Chassis(settings.wheelbase, settings.track, settings.rigid, roll, up, down, layer.room_below)
+
+
 class HeadingLimits(Protocol):
     """Limits as a planner with headings queries them.
 
@@ -60,10 +67,7 @@ class FootprintLimits:
     def __init__(self, mesh_map: MeshMap, layer: TiltLayer, graph: DriveGraph) -> None:
         self.allowed, self.roll = layer.allowed, layer.roll
         self.known = np.zeros(len(graph.moves.ends), dtype=np.uint8)
-        settings = layer.parameters
-        roll, up, down = (math.tan(limit) for limit in layer.limits())
-        measures = settings.wheelbase, settings.track, settings.rigid
-        self.chassis = Chassis(*measures, roll, up, down, layer.room_below)
+        self.chassis = chassis_of(layer)
         self._surface = mesh_map.topology.surface
         self._vertex_count = len(mesh_map.vertices)
 

@@ -13,6 +13,7 @@ import itertools
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_mesh_nav.arrays import BoolArray, Float32Array
 from mbf_mesh_nav.kernels.motion.path_poses import poses_along
+from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.borders import on_surface
 from mbf_mesh_nav.mesh.ground import ground_heights, heights_text
@@ -32,6 +34,7 @@ from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner, surface_point_at_vertex
 from mbf_mesh_nav.plugins import MeshContext, MeshPlanner
 from mbf_mesh_nav.search.blocked_vertices import BlockedVertices
+from mbf_mesh_nav.search.heading_check import HeadingCheck
 from mbf_mesh_nav.search.leg_search import Leg, LegQuery, propagate_from
 
 SAME_POINT = 1e-6
@@ -48,6 +51,9 @@ class SurfacePlannerParameters(PluginParameters):
         unit="m",
         gt=0.0,
     )
+    tilt_layer: str = parameter(
+        "tilt", "Layer of type tilt, if the map has it, whose headings paths keep to; empty = they may have any."
+    )
 
 
 class SurfacePlanner(MeshPlanner):
@@ -56,9 +62,13 @@ class SurfacePlanner(MeshPlanner):
     Parameters = SurfacePlannerParameters
     parameters: SurfacePlannerParameters
 
+    knows_headings: ClassVar[bool] = False
+    """Whether the search itself keeps to the headings a tilt layer allows."""
+
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
         self._blocked_vertices = BlockedVertices(context.navigation_map)
+        self._heading_check = HeadingCheck(context.navigation_map)
 
     @abstractmethod
     def find_leg(self, query: LegQuery) -> Leg | None:
@@ -73,6 +83,17 @@ class SurfacePlanner(MeshPlanner):
             self.mesh_map, query.snapshot, query.blocked, query.start, query.cancel_flag
         )
         return distances if finished else None
+
+    def find_other_leg(self, query: LegQuery) -> Leg | None:
+        """As ``find_leg``, with vertices blocked that are free on the map: nothing may be remembered of it."""
+        return self.find_leg(query)
+
+    def _held_leg(self, query: LegQuery) -> Leg | None:
+        """The best leg whose headings the tilt allows, see ``heading_check``."""
+        leg, layer = self.find_leg(query), self.mesh_map.layers.get(self.parameters.tilt_layer)
+        if leg is None or self.knows_headings or not isinstance(layer, TiltLayer):
+            return leg
+        return self._heading_check.leg_that_holds(query, layer, leg, self.find_other_leg)
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Plan from start over the via points to the goal; see ``AbstractPlanner``."""
@@ -91,7 +112,7 @@ class SurfacePlanner(MeshPlanner):
         for index, (start, goal) in enumerate(itertools.pairwise(stops)):
             ends = poses[index], poses[index + 1]
             tolerance = request.angle_tolerance if index == len(request.via) else 0.0
-            leg = self.find_leg(LegQuery(start, goal, snapshot, blocked, request.cancel_token.flag, *ends, tolerance))
+            leg = self._held_leg(LegQuery(start, goal, snapshot, blocked, request.cancel_token.flag, *ends, tolerance))
             if leg is None:
                 problem = failure_of_leg(self._no_path(start, goal, blocked), index, request)
                 break
@@ -184,7 +205,7 @@ class SurfacePlanner(MeshPlanner):
             vertex = int(np.argmin(offsets))
             if offsets[vertex] > request.dist_tolerance or vertex == tried:
                 return None
-            leg = self.find_leg(replace(query, goal=surface_point_at_vertex(mesh_map, vertex)))
+            leg = self._held_leg(replace(query, goal=surface_point_at_vertex(mesh_map, vertex)))
             if leg is not None:
                 return leg
             tried = vertex  # a search may find out what ``reach`` did not know

@@ -2,8 +2,9 @@
 
 With ``along_track`` it follows the driven track by pure pursuit in reverse, over ground that was free a moment ago;
 where the track ends, is unknown or does not lie behind the robot (it has turned on the spot) it backs up straight. So
-it does where the robot must not turn, as on a slope, or would touch something by turning. Not for a long robot in a
-narrow place: steering backward swings its front outward. Ends with IMPASSABLE before an obstacle.
+it does where the robot must not turn, as on a slope, or would touch something by turning. Ground of a mesh that costs
+too much it crosses along the track, for the robot has just driven over it, but nothing lethal. Not for a long robot in
+a narrow place: steering backward swings its front outward. Ends with IMPASSABLE before an obstacle.
 
 When to use: the robot is too close to an obstacle in front to turn. When not: obstacles may have come up behind it that
 no sensor sees.
@@ -28,6 +29,8 @@ LOOKAHEAD = 0.3
 """Distance [m] to the point of the track that is steered to."""
 TRACK_GAP = 0.5
 """A track whose newest point is farther than this [m] from the robot is not where it came from."""
+BESIDE_TRACK = 0.15
+"""A robot within this [m] of its track drives over ground it has driven over."""
 
 
 class BackUpParameters(GuardedMotionParameters):
@@ -50,19 +53,26 @@ class BackUpRecovery(GuardedRecovery):
         p = self.parameters
         begin = request.motion.pose()
         tracker = PathTracker(Path.from_points(self._track_back(begin), frame_id=begin.frame_id))
+        driven = tracker.lengths[-2]  # what follows lies straight on, where the robot may never have been
 
         def finished(pose: Pose) -> bool:
             tracker.update(pose.position)
             return tracker.progress >= p.distance
+
+        def obstacle(pose: Pose, command: Twist) -> str:
+            reaches = tracker.progress + p.speed * p.check_ahead_time
+            if reaches > driven or tracker.deviation > BESIDE_TRACK:
+                return self.obstacle_ahead(pose, command)
+            return self.navigation_map.obstacle_on_track(self.on_map(pose), command, p.check_ahead_time)
 
         def velocity(pose: Pose) -> Twist:
             if not p.along_track:
                 return Twist.planar(vx=-p.speed)
             _, curvature = arc_to(pose, tracker.point_at(tracker.progress + LOOKAHEAD))
             along = Twist.planar(vx=-p.speed, wz=max(-p.yaw_rate, min(p.yaw_rate, -p.speed * curvature)))
-            return Twist.planar(vx=-p.speed) if self.obstacle_ahead(pose, along) else along
+            return Twist.planar(vx=-p.speed) if obstacle(pose, along) else along
 
-        result = self.drive(request, velocity, finished)
+        result = self.drive(request, velocity, finished, obstacle)
         return RecoveryResult(result.outcome, f"{result.message or 'done'}, backed up {tracker.progress:.2f} m")
 
     def _track_back(self, pose: Pose) -> NDArray[np.float64]:

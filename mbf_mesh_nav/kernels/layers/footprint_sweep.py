@@ -112,6 +112,26 @@ def greatest_use(
         now = until
 
 
+@kernel
+def uses_along(
+    surface: Surface,
+    chassis: Chassis,
+    scratch: Scratch,
+    faces: IntArray,
+    starts: FloatArray,
+    ends: FloatArray,
+    ahead: FloatArray,
+) -> FloatArray:
+    """``greatest_use`` (n,) of short drives (n, 3) [m] near faces (n,), each with a unit vector (n, 2) as heading."""
+    uses = np.empty(len(faces), dtype=np.float64)
+    for index in range(len(faces)):
+        start, end = row(starts, Count(index)), row(ends, Count(index))
+        uses[index] = greatest_use(
+            surface, chassis, scratch, faces[index], start, end, ahead[index, 0], ahead[index, 1]
+        )
+    return uses
+
+
 @inner_kernel
 def edge_use(surface: Surface, chassis: Chassis, scratch: Scratch, begin: int, end: int) -> float:
     """``greatest_use`` from one vertex to its neighbour; inf where no face beside the edge carries a wheel."""

@@ -127,13 +127,23 @@ class TileQuestions(OutlinedMap):
 
         A motion that leads farther than ``reach`` is an obstacle.
         """
+        there = self._around_motion(pose, command, duration)
+        return there if isinstance(there, str) else there.obstacle_ahead(pose, command, duration)
+
+    def obstacle_on_track(self, pose: Pose, command: Twist, duration: float) -> str:
+        """As ``obstacle_ahead``, where only lethal ground is forbidden."""
+        there = self._around_motion(pose, command, duration)
+        return there if isinstance(there, str) else there.obstacle_on_track(pose, command, duration)
+
+    def _around_motion(self, pose: Pose, command: Twist, duration: float) -> MeshMap | str:
+        """The part of the map a motion needs, or why there is none."""
         radius = OF_ROBOTS + command.speed * duration + self.robot_reach
         if radius > self.reach:
             return f"the motion needs {radius:.4g} m of the map of tiles around the robot, the limit is {self._limit}"
         there = self.around(pose.x, pose.y, radius)
         if there is None:
             return f"the robot is more than {OF_ROBOTS:g} m from the surface"
-        return there.obstacle_ahead(pose, command, duration)
+        return there
 
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
         """Offset [m] to the nearest lethal vertex of the robot's storey; None if none is ``within`` [m].

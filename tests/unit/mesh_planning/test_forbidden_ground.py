@@ -113,6 +113,42 @@ def test_backing_up_ends_before_an_obstacle_behind_the_forbidden_ring(make_plugi
     assert "an obstacle is in the way" in result.message
 
 
+@pytest.fixture
+def crossed(make_plugin, paint):
+    """What backing up by 1.5 m from x = 4 m ends with, over a band across x = 3 m, and the robot."""
+
+    def crossed(cost, driven, **options):
+        mesh_map = MeshMap.from_heights(np.zeros((61, 61)), 0.1, 0.1)
+        band = paint(mesh_map, lambda vertices: np.where(np.abs(vertices[:, 0] - 3.0) < 0.16, cost, 0.0))
+        band.inscribed_radius = 0.05
+        robot = Robot(4.0, 3.0)
+        robot.recent_track = lambda: np.array([[x, 3.0, 0.0] for x in np.arange(driven, 4.0, 0.05)])
+        recovery = make_plugin(BackUpRecovery, band, robot=robot, distance=1.5, **options)
+        return recovery.run_behavior(RecoveryRequest(robot, CancelToken())), robot
+
+    return crossed
+
+
+def test_backing_up_along_the_track_crosses_costly_ground_the_robot_has_driven_over(crossed):
+    result, robot = crossed(1.2, driven=1.0, along_track=True)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert robot.x == pytest.approx(2.5, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("cost", "driven", "options"),
+    [
+        (np.inf, 1.0, {"along_track": True}),  # it became lethal behind the robot
+        (1.2, 3.3, {"along_track": True}),  # the track ends before it
+        (1.2, 1.0, {}),
+    ],
+)
+def test_backing_up_does_not_cross_lethal_ground_nor_costly_ground_off_the_track(crossed, cost, driven, options):
+    result, robot = crossed(cost, driven, **options)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    assert robot.x > 3.1
+
+
 def test_escape_does_not_cross_a_lethal_wall(make_plugin, paint):
     mesh_map = MeshMap.from_heights(np.zeros((61, 61)), 0.1, 0.1)
     # Costly ground between two lethal lines; what is free lies beyond them only.
