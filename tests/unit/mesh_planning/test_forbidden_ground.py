@@ -226,4 +226,4 @@ def test_a_path_that_leaves_the_surface_is_blocked_at_its_border(make_plugin, pl
     controller = make_plugin(PathFollower, plain())
     controller.set_plan(Path.from_points(np.array([[4.0, 3.0, 0.0], [8.0, 3.0, 0.0]])))
     result = controller.compute_velocity_commands(ControlRequest(Pose.planar(5.5, 3.0), Twist()))
-    assert result.outcome == ExePathOutcome.BLOCKED_PATH and "0.60 m ahead" in result.message
+    assert result.outcome == ExePathOutcome.BLOCKED_PATH and "would touch it at (6.10, 3.00" in result.message

@@ -29,9 +29,9 @@ def test_a_long_robot_does_not_turn_its_corner_into_a_wall(beside_a_wall):
     here = Pose.planar(3.0, 2.85)
     assert beside_a_wall.obstacle_ahead(here, TURN, 0.6) == "", "a disc of the inscribed radius fits"
     beside_a_wall.inscribed_radius, beside_a_wall.footprint = 0.35, LONG
-    assert "would turn into it at (3." in beside_a_wall.obstacle_ahead(here, TURN, 0.6)
+    assert "would touch it at (3." in beside_a_wall.obstacle_ahead(here, TURN, 0.6)
     creeping = Twist.planar(0.1, wz=0.8)
-    assert "would turn into it at (3." in beside_a_wall.obstacle_ahead(here, creeping, 0.6)
+    assert "would touch it at (3." in beside_a_wall.obstacle_ahead(here, creeping, 0.6)
     assert beside_a_wall.obstacle_ahead(Pose.planar(3.0, 2.6), TURN, 4.0) == "", "it is far enough off"
 
 
@@ -44,7 +44,7 @@ def test_a_corner_in_a_wall_may_be_turned_out_of_it_and_no_deeper(beside_a_wall)
 
 def test_no_corner_is_turned_over_the_border(beside_a_wall):
     beside_a_wall.inscribed_radius, beside_a_wall.footprint = 0.35, LONG
-    assert "would turn into it" in beside_a_wall.obstacle_ahead(Pose.planar(0.4, 1.5, 0.5 * math.pi), TURN, 0.6)
+    assert "would touch it" in beside_a_wall.obstacle_ahead(Pose.planar(0.4, 1.5, 0.5 * math.pi), TURN, 0.6)
 
 
 @given(
