@@ -232,8 +232,10 @@ class MeshWorld(World):
         return plugin_class(MeshContext(*common, transforms=TransformBuffer()))
 
     def pose_on(self, x: float, y: float, yaw: float) -> Pose:
-        """Pose of a robot that stands on the floor."""
+        """Pose of a robot that stands on the floor, straight below or above (x, y)."""
         spot = self.map.locate_one((x, y, 0.0))
+        for _ in range(2):  # the nearest place of a slope lies beside (x, y); a robot would slide 4 cm/s
+            spot = self.map.locate_one((x, y, float(spot.point[2])))
         ahead = np.array([[math.cos(yaw), math.sin(yaw), 0.0]])
         orientation = quaternions_from_axes(ahead, self.map.face_normals[spot.face][None])[0]
         return Pose(tuple(spot.point.tolist()), tuple(orientation.tolist()))

@@ -192,9 +192,9 @@ class Tracker:
             For when [s] their places are given.
         guarded : bool
             For the guard that stops the robot before contact. Two things differ then: objects that ``clear`` has hidden
-            are among them; and an object that was first seen less than ``standing_time`` ago is moving as soon as its
-            estimated speed would take it ``moving_distance`` far in that time. To wait until it has come so far
-            would be too late where somebody comes out from behind a corner.
+            are among them; and an object that was first seen less than ``standing_time`` ago, or has moved before, is
+            moving as soon as its estimated speed would take it ``moving_distance`` far in that time. To wait until it
+            has come so far would be too late where somebody comes out from behind a corner, or goes on after a wait.
         """
         shown = self._confirmed() & (guarded | (self._room[:, states_of.CLEARED] == 0.0))
         rows = np.flatnonzero(shown).tolist()
@@ -202,10 +202,11 @@ class Tracker:
         return tuple(known for known in alike if known.unseen <= self.parameters.forget_time)
 
     def _seems_to_move(self, state: list[float], now: float) -> bool:
-        """Whether an object that was first seen a moment ago is fast enough to be moving."""
+        """Whether an object that was first seen a moment ago, or has moved before, is fast enough to be moving."""
         p = self.parameters
         speed = math.hypot(state[states_of.VX], state[states_of.VY])
-        return now - state[states_of.FIRST_SEEN] <= p.standing_time and speed * p.standing_time >= p.moving_distance
+        may_move = bool(state[states_of.HAS_MOVED]) or now - state[states_of.FIRST_SEEN] <= p.standing_time
+        return may_move and speed * p.standing_time >= p.moving_distance
 
     def _object(self, state: list[float], number: int, now: float, guarded: bool) -> TrackedObject:
         p, later = self.parameters, max(now - self._time, 0.0)

@@ -338,6 +338,17 @@ def test_who_has_been_seen_for_long_and_not_moved_stands_for_the_guard_too():
     assert guarded.motion is Motion.WAITING
 
 
+def test_who_has_moved_waits_and_goes_on_moves_for_the_guard_before_coming_far():
+    """A shuttle that waited for somebody. Its first 0.1 m count; while it waits it stands for the guard too."""
+    waits = [*walk(2.0, 0.0, 0.0, -0.5, 15), *[(2.0, -0.7)] * 40]
+    tracker, now = follow(waits)
+    assert tracker.objects(now, guarded=True)[0].motion is Motion.WAITING
+    tracker, now = follow([*waits, *walk(2.0, -0.7, 0.0, -0.5, 3)])
+    (known,), (guarded,) = tracker.objects(now), tracker.objects(now, guarded=True)
+    assert known.motion is Motion.WAITING and guarded.motion is Motion.MOVING
+    assert guarded.vy == pytest.approx(-0.5, abs=0.2)
+
+
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=10, deadline=None)
 def test_the_same_scans_give_the_same_objects(seed):
