@@ -15,7 +15,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from mbf_abstract.events import MemorySink
+from mbf_abstract.event_sinks import MemorySink
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.plugins import PlanResult

@@ -25,7 +25,8 @@ from terrain_meshes import fractal_terrain
 
 from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
-from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.locate import SurfaceLocator
 from mbf_mesh_nav.search.wave_search import WaveSearch

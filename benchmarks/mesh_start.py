@@ -33,7 +33,8 @@ from mbf_mesh_nav.controllers.path_follower import PathFollower
 from mbf_mesh_nav.controllers.vector_field import VectorFieldController
 from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.map.layer import LayerContext
-from mbf_mesh_nav.map.map_builder import build_mesh_map, default_layers
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import default_layers
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner

@@ -25,7 +25,7 @@ from tiles import SETTINGS, SPACING, write_heights
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_mesh_nav.map.map_builder import MeshLayerEntry
+from mbf_mesh_nav.map.map_parameters import MeshLayerEntry
 from mbf_mesh_nav.tiles.build import build_tiles
 from mbf_mesh_nav.tiles.planning import plan_between, plan_on_tiles
 from mbf_mesh_nav.tiles.portals import NOT_CANCELLED

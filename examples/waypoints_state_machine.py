@@ -19,7 +19,8 @@ from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery
 from mbf_abstract.executives.state_machine import State, StateMachine
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.goals.goal_types import GetPathGoal, GetPathResult
+from mbf_abstract.goals.goal_types import GetPathGoal
+from mbf_abstract.goals.result_types import GetPathResult
 from terrain.session.session import Session, SessionOptions
 
 WAYPOINTS = [(7.5, 1.5), (1.5, 5.0), (6.0, 5.5), (3.5, 1.5)]  # x, y [m], all in the reception

@@ -19,29 +19,28 @@ from collections.abc import Iterable
 from typing import Any, overload
 
 from mbf_abstract.drive.robot import Robot
-from mbf_abstract.events import EventBus
+from mbf_abstract.event_bus import EventBus
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.goals.feedback_types import ExePathFeedback, FollowWaypointsFeedback, MoveBaseFeedback, NoFeedback
 from mbf_abstract.goals.goal_types import (
-    ExePathFeedback,
     ExePathGoal,
-    ExePathResult,
-    FollowWaypointsFeedback,
     FollowWaypointsGoal,
-    FollowWaypointsResult,
     GetPathGoal,
-    GetPathResult,
-    MoveBaseFeedback,
     MoveBaseGoal,
-    MoveBaseResult,
-    NoFeedback,
     RecoveryGoal,
-    RecoveryResultMessage,
     RefinePathGoal,
-    RefinePathResult,
     WaypointTask,
 )
 from mbf_abstract.goals.handle import GoalHandle
+from mbf_abstract.goals.result_types import (
+    ExePathResult,
+    FollowWaypointsResult,
+    GetPathResult,
+    MoveBaseResult,
+    RecoveryResultMessage,
+    RefinePathResult,
+)
 from mbf_abstract.server.factory import make_server
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.time.clock import Clock, WallClock

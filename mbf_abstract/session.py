@@ -18,7 +18,9 @@ from typing import TypeVar
 
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.drive.robot import Robot
-from mbf_abstract.events import EventBus, EventKind, EventSink, MemorySink
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.event_sinks import MemorySink
+from mbf_abstract.events import EventKind, EventSink
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer

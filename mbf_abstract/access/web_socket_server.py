@@ -16,7 +16,8 @@ from typing import Any, Generic
 from mbf_abstract.access.admission import Admission
 from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.access.visitor import AnyVisitor, Service, Visitor
-from mbf_abstract.events import EventBus, EventKind
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.events import EventKind
 from mbf_abstract.time.clock import ClockThread, WallClock
 
 POLICY_VIOLATION, TRY_AGAIN_LATER = 1008, 1013  # WebSocket close codes (RFC 6455, 7.4.1)

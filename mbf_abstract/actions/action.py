@@ -19,8 +19,9 @@ from mbf_abstract.execution.loaded_plugin import PluginGone
 from mbf_abstract.execution.plugin_run import Abandoned
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.worker import Worker
-from mbf_abstract.goals.goal_types import ActionResult
-from mbf_abstract.goals.handle import GoalHandle, GoalStatus
+from mbf_abstract.goals.goal_status import GoalStatus
+from mbf_abstract.goals.handle import GoalHandle
+from mbf_abstract.goals.result_types import ActionResult
 from mbf_abstract.outcomes import is_success
 from mbf_abstract.time.clock import ThreadDetached
 

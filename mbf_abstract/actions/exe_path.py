@@ -20,8 +20,10 @@ from mbf_abstract.execution.progress import PathProgress
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.tangent_plane import SAME_STOREY
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.goals.goal_types import ExePathFeedback, ExePathGoal, ExePathResult
+from mbf_abstract.goals.feedback_types import ExePathFeedback
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.goals.handle import GoalHandle
+from mbf_abstract.goals.result_types import ExePathResult
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import AbstractController, ControlResult, PluginKind
 

@@ -16,17 +16,11 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.plugin_run import IDLE_CHECK, Abandoned
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import (
-    ExePathFeedback,
-    FollowWaypointsFeedback,
-    FollowWaypointsGoal,
-    FollowWaypointsResult,
-    MoveBaseFeedback,
-    MoveBaseGoal,
-    MoveBaseResult,
-    WaypointTask,
-)
-from mbf_abstract.goals.handle import GoalHandle, GoalStatus
+from mbf_abstract.goals.feedback_types import ExePathFeedback, FollowWaypointsFeedback, MoveBaseFeedback
+from mbf_abstract.goals.goal_status import GoalStatus
+from mbf_abstract.goals.goal_types import FollowWaypointsGoal, MoveBaseGoal, WaypointTask
+from mbf_abstract.goals.handle import GoalHandle
+from mbf_abstract.goals.result_types import FollowWaypointsResult, MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
 from mbf_abstract.time.clock import ThreadDetached
 

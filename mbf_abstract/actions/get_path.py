@@ -18,8 +18,10 @@ from mbf_abstract.execution.plan_check import area_problem, in_global_frame, pat
 from mbf_abstract.execution.planner import FALLBACK_OUTCOMES, PlannerExecution, PlannerState
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.goals.goal_types import GetPathGoal, GetPathResult, NoFeedback
+from mbf_abstract.goals.feedback_types import NoFeedback
+from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.goals.handle import GoalHandle
+from mbf_abstract.goals.result_types import GetPathResult
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginKind
 

@@ -45,8 +45,10 @@ from mbf_abstract.execution.plan_check import arrival_problem, in_global_frame
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.goals.goal_types import MoveBaseFeedback, MoveBaseGoal, MoveBaseResult
+from mbf_abstract.goals.feedback_types import MoveBaseFeedback
+from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import GoalHandle
+from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.plugin_table import PluginTable

@@ -16,14 +16,10 @@ from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.arrival_tolerance import planned_tolerance, tolerance_left
-from mbf_abstract.goals.goal_types import (
-    ExePathFeedback,
-    GetPathResult,
-    MoveBaseFeedback,
-    MoveBaseGoal,
-    RefinePathResult,
-)
+from mbf_abstract.goals.feedback_types import ExePathFeedback, MoveBaseFeedback
+from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.goals.result_types import GetPathResult, RefinePathResult
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from mbf_abstract.server.plugin_table import PluginTable
 from mbf_abstract.time.clock import Stopwatch

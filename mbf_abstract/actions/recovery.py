@@ -14,8 +14,10 @@ from mbf_abstract.actions.plugin_action import PluginAction
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.recovery import RecoveryExecution
-from mbf_abstract.goals.goal_types import NoFeedback, RecoveryGoal, RecoveryResultMessage
+from mbf_abstract.goals.feedback_types import NoFeedback
+from mbf_abstract.goals.goal_types import RecoveryGoal
 from mbf_abstract.goals.handle import GoalHandle
+from mbf_abstract.goals.result_types import RecoveryResultMessage
 from mbf_abstract.outcomes import RecoveryOutcome, is_success
 from mbf_abstract.parameters import with_changes
 from mbf_abstract.plugins import AbstractRecovery, PluginKind

@@ -8,8 +8,10 @@ from mbf_abstract.actions.action import GoalJob
 from mbf_abstract.actions.plugin_action import PluginAction
 from mbf_abstract.execution.refiner import RefinerExecution
 from mbf_abstract.geometry import Path
-from mbf_abstract.goals.goal_types import NoFeedback, RefinePathGoal, RefinePathResult
+from mbf_abstract.goals.feedback_types import NoFeedback
+from mbf_abstract.goals.goal_types import RefinePathGoal
 from mbf_abstract.goals.handle import GoalHandle
+from mbf_abstract.goals.result_types import RefinePathResult
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import AbstractRefiner, PluginKind, RefineResult
 

@@ -12,16 +12,10 @@ from mbf_abstract.actions.get_path import GetPathAction
 from mbf_abstract.actions.recovery import RecoveryAction
 from mbf_abstract.actions.refine_path import RefinePathAction
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.goals.goal_types import (
-    ExePathGoal,
-    GetPathGoal,
-    MoveBaseFeedback,
-    MoveBaseGoal,
-    MoveBaseResult,
-    RecoveryGoal,
-    RefinePathGoal,
-)
+from mbf_abstract.goals.feedback_types import MoveBaseFeedback
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.goals.result_types import MoveBaseResult
 
 SUB_GOAL_SLOT = 255  # so that a client's goal in slot 0 does not preempt a part of move_base
 

@@ -17,7 +17,8 @@ from mbf_abstract.commands.waiting import waiting
 
 if TYPE_CHECKING:
     from mbf_abstract.geometry import Pose
-    from mbf_abstract.goals.goal_types import GetPathGoal, GetPathResult, RefinePathResult
+    from mbf_abstract.goals.goal_types import GetPathGoal
+    from mbf_abstract.goals.result_types import GetPathResult, RefinePathResult
     from mbf_abstract.server.navigation_server import AbstractNavigationServer
 
 

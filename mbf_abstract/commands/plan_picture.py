@@ -10,7 +10,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import GetPathResult
+from mbf_abstract.goals.result_types import GetPathResult
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 
 PICTURES_GROUP = "mbf.plan_pictures"

@@ -10,8 +10,9 @@ import inspect
 
 from mbf_abstract.drive.commands import stands_still, zero_like
 from mbf_abstract.drive.robot import Robot
+from mbf_abstract.event_bus import EventBus
 from mbf_abstract.event_values import error_text
-from mbf_abstract.events import EventBus, EventKind
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Command, Twist
 from mbf_abstract.time.clock import Clock, Condition, ThreadDetached, is_for_the_program
 

@@ -1,8 +1,7 @@
 """The only writer to the robot: leases, limits, a watchdog, and zero velocity at every end.
 
-A controller or recovery drives through a *lease*. One lease exists at a time; a command through a lease that was
-released or revoked is dropped, so nothing a late thread does can move the robot (promise P1). When commands stop
-coming for ``command_timeout`` the watchdog sends zero.
+A controller or recovery drives through a *lease*. One exists at a time; a command through one that was released or
+revoked is dropped, so no late thread moves the robot (P1). After ``command_timeout`` without commands zero is sent.
 """
 
 from __future__ import annotations
@@ -13,7 +12,8 @@ from mbf_abstract.drive.command_writer import CommandWriter
 from mbf_abstract.drive.commands import command_data, command_problem
 from mbf_abstract.drive.robot import Robot
 from mbf_abstract.drive.velocity_limits import VelocityLimits
-from mbf_abstract.events import EventBus, EventKind
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Command
 from mbf_abstract.time.clock import Clock, Priority, ThreadDetached
 

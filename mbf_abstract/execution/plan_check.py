@@ -12,7 +12,8 @@ from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_area import GoalArea
-from mbf_abstract.goals.goal_types import ExePathGoal, GetPathResult, MoveBaseGoal
+from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal
+from mbf_abstract.goals.result_types import GetPathResult
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 

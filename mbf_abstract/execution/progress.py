@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.goals.goal_types import ExePathFeedback
+from mbf_abstract.goals.feedback_types import ExePathFeedback
 from mbf_abstract.plugins import ControlResult
 from mbf_abstract.time.clock import Clock, Stopwatch
 

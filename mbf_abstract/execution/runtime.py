@@ -11,7 +11,7 @@ from typing import Protocol
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.drive.velocity_gate import VelocityGate
-from mbf_abstract.events import EventBus
+from mbf_abstract.event_bus import EventBus
 from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer

@@ -13,10 +13,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.leaves import GetPath
 from mbf_abstract.executives.nodes import Composite
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.goals.goal_types import (
-    ActionResult,
-    GetPathResult,
-)
+from mbf_abstract.goals.result_types import ActionResult, GetPathResult
 from mbf_abstract.maps.tracking.blocking import Blockage
 from mbf_abstract.maps.tracking.objects import Motion
 

@@ -15,18 +15,9 @@ from py_trees.common import Status
 from mbf_abstract.executives.nodes import Leaf
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.arrival_tolerance import planned_tolerance, tolerance_left
-from mbf_abstract.goals.goal_types import (
-    ActionResult,
-    ExePathGoal,
-    ExePathResult,
-    GetPathGoal,
-    GetPathResult,
-    MoveBaseGoal,
-    RecoveryGoal,
-    RefinePathGoal,
-    RefinePathResult,
-)
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.goals.result_types import ActionResult, ExePathResult, GetPathResult, RefinePathResult
 
 
 class ActionLeaf(Leaf):

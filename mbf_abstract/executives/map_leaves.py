@@ -15,7 +15,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.nodes import Leaf
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.goals.goal_types import ActionResult
+from mbf_abstract.goals.result_types import ActionResult
 from mbf_abstract.maps.queries import CellState, PathAnswer, PlaceAnswer, PlaceQuery
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 

@@ -14,8 +14,9 @@ import numpy as np
 from mbf_abstract.actions.stuck_monitor import StuckMonitor
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.goals.goal_types import ActionResult, ExePathFeedback, ExePathResult, GetPathResult
+from mbf_abstract.goals.feedback_types import ExePathFeedback
 from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.goals.result_types import ActionResult, ExePathResult, GetPathResult
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, is_success
 from mbf_abstract.time.clock import Clock

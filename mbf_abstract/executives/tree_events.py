@@ -17,7 +17,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from mbf_abstract.events import Event, EventBus, EventKind
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.events import Event, EventKind
 
 if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour

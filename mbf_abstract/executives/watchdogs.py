@@ -16,7 +16,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.execution.motion_watch import OscillationDetector
 from mbf_abstract.executives.nodes import Decorator
 from mbf_abstract.geometry import Path
-from mbf_abstract.goals.goal_types import ActionResult
+from mbf_abstract.goals.result_types import ActionResult
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.time.clock import Stopwatch
 

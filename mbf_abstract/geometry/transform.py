@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -167,3 +168,19 @@ def _add(a: Vector3, b: Vector3) -> Vector3:
 def _multiply_many(a: Quaternion, b: FloatArray) -> FloatArray:
     """Hamilton products ``a * b[i]`` of one quaternion with (n, 4) others."""
     return np.stack(quaternion_multiply(a, tuple(b.T)), axis=-1)
+
+
+def composed(target_steps: list[Transform], source_steps: list[Transform], time: float) -> Transform:
+    """``T_target_source`` of the steps from both frames up to where they meet; at least one list has steps."""
+    T_common_target, T_common_source = _product(target_steps), _product(source_steps)
+    if T_common_target is None:
+        assert T_common_source is not None
+        return replace(T_common_source, stamp=time)
+    T_target_common = T_common_target.inverse()
+    T_target_source = T_target_common if T_common_source is None else T_target_common @ T_common_source
+    return replace(T_target_source, stamp=time)
+
+
+def _product(steps: list[Transform]) -> Transform | None:
+    """``T_top_bottom`` of steps that lead up from the bottom; None for no steps."""
+    return reduce(lambda product, T_parent_child: T_parent_child @ product, steps) if steps else None

@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import reduce
+from dataclasses import dataclass
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import (
@@ -18,30 +17,24 @@ from mbf_abstract.geometry.transform import (
     InvalidTransformError,
     Transform,
     TransformError,
+    composed,
     frame_name_problem,
 )
-from mbf_abstract.geometry.transform_cache import TransformCache
+from mbf_abstract.geometry.transform_cache import TransformCache, steps_up
+from mbf_abstract.geometry.transform_problems import (
+    MAX_LEAD,
+    ConnectivityError,
+    ExtrapolationError,
+    StaleTransformError,
+    UnknownFrameError,
+    age_problem,
+    ahead_text,
+    gap_text,
+    lookup_text,
+    refuse_loop,
+)
 
-MAX_LEAD = 2.0
-"""How far [s] a transform may be stamped in the future. Localisations post-date theirs, commonly by up to a second."""
-MAX_LISTED_FRAMES = 20
 MAX_PENDING_REQUESTS = 1000
-
-
-class UnknownFrameError(TransformError):
-    """No transform of a frame was ever received."""
-
-
-class ConnectivityError(TransformError):
-    """Both frames are known but belong to different trees."""
-
-
-class ExtrapolationError(TransformError):
-    """The asked time lies outside the kept history."""
-
-
-class StaleTransformError(TransformError):
-    """The newest transform is older than the caller allows, or from the future."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +74,7 @@ class TransformBuffer:
         """
         with self._lock:
             self._now = now
-            limit = now() + MAX_LEAD
-            self._caches = {child: cache for child, cache in self._caches.items() if cache.forget_after(limit)}
+            self._caches = {name: one for name, one in self._caches.items() if one.forget_after(now() + MAX_LEAD)}
 
     def set(self, transform: Transform) -> None:
         """Add one transform. A sample older than the history, known already or from the future changes nothing.
@@ -93,11 +85,10 @@ class TransformBuffer:
             A frame would be its own ancestor.
         """
         with self._lock:
-            self._refuse_loop(transform)
+            refuse_loop(transform, [step.parent for step in steps_up(self._caches, transform.parent)])
             received = math.inf if self._now is None else self._now()
             if not transform.static and transform.stamp > received + MAX_LEAD:
-                ahead = f"{transform.stamp - received:.3f} s ahead of the clock, limit {MAX_LEAD:.3f} s"
-                self._refused[transform.child] = f"{transform.parent}->{transform.child} ({ahead})"
+                self._refused[transform.child] = ahead_text(transform, received)
                 return
             self._refused.pop(transform.child, None)
             cache = self._caches.setdefault(transform.child, TransformCache(self.cache_time))
@@ -214,12 +205,12 @@ class TransformBuffer:
             time = min(stamps) if stamps else now or 0.0
         if moving and now is not None and max_age is not None:
             fresh_at = min(self._caches[part.child].fresh_at for part in moving) if asked is None else asked
-            problem = _age_problem(now - fresh_at, now - max(stamps), max_age)
+            problem = age_problem(now - fresh_at, now - max(stamps), max_age)
             if problem:
                 raise StaleTransformError(self._text(target, source, problem, now))
         if any(stamp != time for stamp in stamps):  # the newest of each frame are of different times
             target_parts, source_parts = self._parts(target, source, time, now)
-        return _compose(target_parts, source_parts, time)
+        return composed(target_parts, source_parts, time)
 
     def _parts(
         self, target: str, source: str, time: float | None, now: float | None
@@ -228,7 +219,7 @@ class TransformBuffer:
         if unknown := [repr(name) for name in (source, target) if name not in self._frame_names]:
             reason = " and ".join(unknown) + (" are unknown frames" if len(unknown) == 2 else " is an unknown frame")
             raise UnknownFrameError(self._text(target, source, reason, now))
-        target_steps, source_steps = self._walk(target, time), self._walk(source, time)
+        target_steps, source_steps = steps_up(self._caches, target, time), steps_up(self._caches, source, time)
         target_names = [target, *(step.parent for step in target_steps)]
         source_names = [source, *(step.parent for step in source_steps)]
         for count, name in enumerate(source_names):
@@ -236,30 +227,9 @@ class TransformBuffer:
                 return target_steps[: target_names.index(name)], source_steps[:count]
         for top in (source_names[-1], target_names[-1]):
             if top in self._caches:  # the frame has a parent, but not at this time
-                raise ExtrapolationError(self._text(target, source, self._gap_text(top, time), now))
+                raise ExtrapolationError(self._text(target, source, gap_text(top, self._caches[top], time), now))
         reason = f"they are in separate trees with the roots {source_names[-1]!r} and {target_names[-1]!r}"
         raise ConnectivityError(self._text(target, source, reason, now))
-
-    def _walk(self, frame: str, time: float | None) -> list[Transform]:
-        """Return the steps from a frame up to the root, or to the first frame whose history does not cover the time."""
-        steps: list[Transform] = []
-        while (cache := self._caches.get(frame)) is not None and len(steps) <= len(self._caches):
-            step = cache.newest if time is None else cache.at(time)
-            if step is None:
-                break
-            steps.append(step)
-            frame = step.parent
-        return steps
-
-    def _refuse_loop(self, transform: Transform) -> None:
-        if transform.parent == transform.child:
-            raise InvalidTransformError(f"transform {transform.parent!r} -> {transform.child!r}: a frame in itself")
-        ancestors = [transform.parent, *(step.parent for step in self._walk(transform.parent, None))]
-        if transform.child in ancestors:
-            loop = " -> ".join([*ancestors[: ancestors.index(transform.child) + 1], transform.parent])
-            raise InvalidTransformError(
-                f"transform {transform.parent!r} -> {transform.child!r} closes a loop: {loop} (child -> parent)"
-            )
 
     def _take_answered_requests(self) -> list[tuple[_Request, Transform]]:
         answered, waiting = [], []
@@ -276,51 +246,5 @@ class TransformBuffer:
             if request in self._requests:
                 self._requests.remove(request)
 
-    # ------------------------------------------------------------------------------------------------ error texts
     def _text(self, target: str, source: str, reason: str, now: float | None) -> str:
-        existing = [_describe_cache(child, cache, now) for child, cache in sorted(self._caches.items())]
-        more = f", and {len(existing) - MAX_LISTED_FRAMES} more" if len(existing) > MAX_LISTED_FRAMES else ""
-        listed = ", ".join(existing[:MAX_LISTED_FRAMES]) + more if existing else "no transform at all"
-        refused = f"; refused: {', '.join(self._refused.values())}" if self._refused else ""
-        return f"no transform from {source!r} to {target!r}: {reason}; there is {listed}{refused}"
-
-    def _gap_text(self, child: str, time: float | None) -> str:
-        cache = self._caches[child]
-        if len(cache) == 1:
-            return f"asked for {time:.3f} s, but {child!r} has one sample at {cache.newest.stamp:.3f} s"
-        side = "past" if time is not None and time < cache.oldest.stamp else "future"
-        span = f"{cache.oldest.stamp:.3f} s to {cache.newest.stamp:.3f} s"
-        return f"asked for {time:.3f} s, an extrapolation into the {side}: {child!r} is known from {span}"
-
-
-def _age_problem(age: float, least_age: float, max_age: float) -> str:
-    """Why transforms of these ages [s] are not fresh; ``least_age`` is that of the latest stamp, negative if ahead."""
-    if age > max_age:
-        return f"the newest is {age:.3f} s old, limit {max_age:.3f} s"
-    if least_age < -MAX_LEAD:
-        return f"the newest is stamped {-least_age:.3f} s in the future, limit {MAX_LEAD:.3f} s"
-    return ""
-
-
-def _compose(target_steps: list[Transform], source_steps: list[Transform], time: float) -> Transform:
-    """``T_target_source`` of the steps from both frames up to where they meet; at least one list has steps."""
-    T_common_target, T_common_source = _product(target_steps), _product(source_steps)
-    if T_common_target is None:
-        assert T_common_source is not None
-        return replace(T_common_source, stamp=time)
-    T_target_common = T_common_target.inverse()
-    T_target_source = T_target_common if T_common_source is None else T_target_common @ T_common_source
-    return replace(T_target_source, stamp=time)
-
-
-def _product(steps: list[Transform]) -> Transform | None:
-    """``T_top_bottom`` of steps that lead up from the bottom; None for no steps."""
-    return reduce(lambda product, T_parent_child: T_parent_child @ product, steps) if steps else None
-
-
-def _describe_cache(child: str, cache: TransformCache, now: float | None) -> str:
-    newest = cache.newest
-    if newest.static:
-        return f"{newest.parent}->{child} (static)"
-    age = f"at {newest.stamp:.3f} s" if now is None else f"{now - newest.stamp:.3f} s old"
-    return f"{newest.parent}->{child} ({age})"
+        return lookup_text(target, source, reason, self._caches, self._refused.values(), now)

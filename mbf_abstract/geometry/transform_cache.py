@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from operator import attrgetter
 
 from mbf_abstract.geometry.transform import Transform
@@ -102,3 +102,23 @@ class TransformCache:
         while self._samples[keep_from].stamp < limit:
             keep_from += 1
         del self._samples[:keep_from]
+
+
+def steps_up(caches: Mapping[str, TransformCache], frame: str, time: float | None = None) -> list[Transform]:
+    """Steps from a frame up to the root, or to the first frame whose history does not cover the time.
+
+    Parameters
+    ----------
+    caches : mapping of str to TransformCache
+        By the names of child frames.
+    time : float, optional
+        [s]; the newest of each frame if not given.
+    """
+    steps: list[Transform] = []
+    while (cache := caches.get(frame)) is not None and len(steps) <= len(caches):
+        step = cache.newest if time is None else cache.at(time)
+        if step is None:
+            break
+        steps.append(step)
+        frame = step.parent
+    return steps

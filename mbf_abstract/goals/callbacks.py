@@ -12,8 +12,9 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 
+from mbf_abstract.event_bus import EventBus
 from mbf_abstract.event_values import error_text
-from mbf_abstract.events import EventBus, EventKind
+from mbf_abstract.events import EventKind
 from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.time.clock import Clock, Priority
 

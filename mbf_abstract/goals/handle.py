@@ -13,13 +13,13 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Generator
-from contextlib import suppress
-from enum import Enum
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
 from mbf_abstract.events import EventKind
-from mbf_abstract.goals.goal_types import ActionResult
+from mbf_abstract.goals.awaiting import awaited
+from mbf_abstract.goals.goal_status import GoalStatus
+from mbf_abstract.goals.result_types import ActionResult
 from mbf_abstract.time.cancel import CancelToken
 
 if TYPE_CHECKING:
@@ -28,27 +28,6 @@ if TYPE_CHECKING:
 G = TypeVar("G")
 R = TypeVar("R", bound=ActionResult)
 F = TypeVar("F")
-
-
-class GoalStatus(Enum):
-    """Where a goal is. The last four are final; a goal reaches exactly one of them, once."""
-
-    PENDING = "pending"
-    ACTIVE = "active"
-    PAUSED = "paused"
-    CANCELING = "canceling"
-    SUCCEEDED = "succeeded"
-    ABORTED = "aborted"
-    CANCELED = "canceled"
-    REJECTED = "rejected"
-
-    @property
-    def is_final(self) -> bool:
-        """Whether the goal is over."""
-        return self in _FINAL
-
-
-_FINAL = {GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.CANCELED, GoalStatus.REJECTED}
 
 
 class GoalHandle(Generic[G, R, F]):
@@ -138,32 +117,7 @@ class GoalHandle(Generic[G, R, F]):
             return self._result
 
     def __await__(self) -> Generator[Any, None, R]:
-        return self._wait_async().__await__()
-
-    async def _wait_async(self) -> R:
-        import asyncio  # only who awaits a goal needs it; it takes 20 ms
-
-        loop = asyncio.get_running_loop()
-        finished = loop.create_future()
-
-        def set_finished() -> None:
-            if not finished.done():
-                finished.set_result(None)
-
-        def wake(_: object) -> None:
-            if self.done and not loop.is_closed():
-                with suppress(RuntimeError):  # the loop was closed at this moment
-                    loop.call_soon_threadsafe(set_finished)
-
-        self.subscribe(wake)
-        try:
-            with self._runtime.clock.outside():
-                await finished
-        except asyncio.CancelledError:
-            self.cancel("the task that awaited the goal was canceled")
-            raise
-        assert self._result is not None
-        return self._result
+        return awaited(self, self._runtime.clock).__await__()
 
     def cancel(self, reason: str = "canceled by the client") -> None:
         """Ask the goal to end; idempotent, without effect on a finished goal. Never waits."""

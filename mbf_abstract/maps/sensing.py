@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.geometry.transform_buffer import ExtrapolationError, TransformBuffer
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.geometry.transform_problems import ExtrapolationError
 
 TRANSFORM_TOLERANCE = 0.3
 """How much newer [s] than the newest transform a scan may be; costmap_2d's and Nav2's default."""

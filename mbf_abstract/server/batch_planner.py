@@ -25,7 +25,7 @@ from mbf_abstract.event_values import error_text
 from mbf_abstract.execution.plan_check import in_global_frame, path_result
 from mbf_abstract.execution.plugin_answer import PluginFault, checked_answer
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import GetPathResult
+from mbf_abstract.goals.result_types import GetPathResult
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginKind
 from mbf_abstract.server.navigation_server import AbstractNavigationServer

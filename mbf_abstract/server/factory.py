@@ -13,7 +13,7 @@ from mbf_abstract.config.installed_plugins import installed_points
 from mbf_abstract.config.reading import load_config, validate_config
 from mbf_abstract.config.registry import PluginError, PluginRegistry
 from mbf_abstract.drive.robot import Robot
-from mbf_abstract.events import EventBus
+from mbf_abstract.event_bus import EventBus
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.view import FloorMap
 from mbf_abstract.server.navigation_server import AbstractNavigationServer

@@ -1,8 +1,7 @@
 """The abstract navigation server: owns the runtime, the plugins and the six actions. It knows no map.
 
 A server of a map overrides hooks only (``server.map_interface``): make the map, make a plugin's context, decide
-whether it may be driven on, keep it alive while goals run, answer map queries. Examples: ``mbf_costmap_nav.server``,
-``mbf_mesh_nav.server``.
+whether it may be driven on, keep it alive while goals run, answer map queries. See ``mbf_costmap_nav.server``.
 """
 
 from __future__ import annotations
@@ -23,7 +22,8 @@ from mbf_abstract.drive.driver_check import check_driver
 from mbf_abstract.drive.robot import Robot, RobotInformation, turning_radius_of
 from mbf_abstract.drive.velocity_gate import VelocityGate
 from mbf_abstract.drive.velocity_limits import VelocityLimits
-from mbf_abstract.events import EventBus, EventKind
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.geometry import Path, Pose, Twist

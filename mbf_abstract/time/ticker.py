@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from mbf_abstract.event_bus import EventBus
 from mbf_abstract.event_values import error_text
-from mbf_abstract.events import EventBus, EventKind
+from mbf_abstract.events import EventKind
 from mbf_abstract.time.clock import Clock, Priority
 
 

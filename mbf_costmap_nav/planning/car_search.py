@@ -18,7 +18,8 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.kernels.car.ground import Ground, ground_of, pose_cost
-from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP, HEADINGS, Target, hybrid_search
+from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP, hybrid_search
+from mbf_costmap_nav.kernels.car.joints import HEADINGS, Target
 from mbf_costmap_nav.kernels.car.motion_primitives import Car
 from mbf_costmap_nav.kernels.car.shorter_drive import shortened
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND, search

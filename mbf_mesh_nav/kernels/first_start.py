@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from mbf_mesh_nav.kernels.layers.edge_weights import show_changes
+from mbf_mesh_nav.kernels.layers.fading_costs import set_fading_costs
 from mbf_mesh_nav.kernels.layers.footprint_settling import settle_footprints
-from mbf_mesh_nav.kernels.layers.inflation import repair_distances, set_fading_costs
+from mbf_mesh_nav.kernels.layers.inflation import repair_distances
 from mbf_mesh_nav.kernels.layers.neighbourhood_layers import height_differences, mean_edge_angles, neighbourhood_means
 from mbf_mesh_nav.kernels.mesh.bounding_boxes import closest_face, closest_faces
 from mbf_mesh_nav.kernels.mesh.corners import build_corner_ends, write_corner_weights

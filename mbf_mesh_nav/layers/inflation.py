@@ -20,7 +20,8 @@ from pydantic import model_validator
 from mbf_abstract.maps.layers.inflation import InflationRadii
 from mbf_abstract.parameters import parameter, with_changes
 from mbf_mesh_nav.arrays import IntArray
-from mbf_mesh_nav.kernels.layers.inflation import repair_distances, set_fading_costs, update_sources
+from mbf_mesh_nav.kernels.layers.fading_costs import set_fading_costs
+from mbf_mesh_nav.kernels.layers.inflation import repair_distances, update_sources
 from mbf_mesh_nav.map.layer import CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
 from mbf_mesh_nav.map.layer_graph import union_of
 

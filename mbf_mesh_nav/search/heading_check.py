@@ -17,7 +17,8 @@ import numpy as np
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
-from mbf_mesh_nav.kernels.layers.footprint_sweep import scratch_for, uses_along
+from mbf_mesh_nav.kernels.layers.chassis import scratch_for
+from mbf_mesh_nav.kernels.layers.footprint_sweep import uses_along
 from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.positions import position_text

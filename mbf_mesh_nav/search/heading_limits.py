@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray
-from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, greatest_use, scratch_for
+from mbf_mesh_nav.kernels.layers.chassis import Chassis, scratch_for
+from mbf_mesh_nav.kernels.layers.footprint_sweep import greatest_use
 from mbf_mesh_nav.kernels.mesh.slopes import slopes_of_edges, tilt_of_normals
 from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, FORBIDDEN, HEADING_STEP, HEADINGS
 from mbf_mesh_nav.layers.tilt import TiltLayer

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.layers.footprint_sweep import scratch_for
+from mbf_mesh_nav.kernels.layers.chassis import scratch_for
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, follow_predecessors, propagate_distances
 from mbf_mesh_nav.kernels.search.goal_bound import GoalBound, weights_of_arrivals
 from mbf_mesh_nav.kernels.search.heading_astar import FORBIDDEN, HEADINGS, find_out_along, search_with_heading

@@ -24,7 +24,8 @@ import numpy as np
 from mbf_abstract.maps.layers.layer_list import PlannedLayer
 from mbf_mesh_nav.arrays import BoolArray, IntArray
 from mbf_mesh_nav.map.layer import MeshLayer
-from mbf_mesh_nav.map.map_builder import MeshMapParameters, compute_layers, plan_mesh_layers
+from mbf_mesh_nav.map.map_builder import compute_layers, plan_mesh_layers
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
 from mbf_mesh_nav.mesh.mesh_report import MeshError

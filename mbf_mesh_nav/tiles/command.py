@@ -36,7 +36,8 @@ def tile(
         from mbf_abstract.server.standing_server import read_config_text
         from mbf_mesh_nav.files.vertex_errors import read_vertex_errors
         from mbf_mesh_nav.map.height_error import with_height_error
-        from mbf_mesh_nav.map.map_builder import MeshMapParameters, height_error_of
+        from mbf_mesh_nav.map.map_builder import height_error_of
+        from mbf_mesh_nav.map.map_parameters import MeshMapParameters
         from mbf_mesh_nav.server import BARE_MESH
         from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
         from mbf_mesh_nav.tiles.cluster_build import BuildOrder, entries_from_cluster

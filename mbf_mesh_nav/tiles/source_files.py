@@ -9,7 +9,7 @@ import numpy as np
 from mbf_mesh_nav.files.elevation_files import ElevationReader, elevation_readers
 from mbf_mesh_nav.files.mesh_io import read_mesh
 from mbf_mesh_nav.files.vertex_errors import errors_on_mesh, read_vertex_errors
-from mbf_mesh_nav.map.map_builder import MeshMapParameters
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.mesh.densify import densify
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.mesh.repair import checked_mesh

@@ -10,7 +10,8 @@ from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.event_values import error_text
 from mbf_abstract.geometry import Command
 from mbf_abstract.geometry.transform import Transform, TransformError
-from mbf_abstract.geometry.transform_buffer import MAX_LEAD, TransformBuffer
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.geometry.transform_problems import MAX_LEAD
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.server.map_server import MapServer
 from mbf_ros.bags.reading import Bag, Recorded

@@ -11,8 +11,9 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.goals.goal_types import GetPathGoal, GetPathResult, RefinePathGoal
+from mbf_abstract.goals.goal_types import GetPathGoal, RefinePathGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.goals.result_types import GetPathResult
 from mbf_abstract.navigator import Navigator
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from mbf_abstract.geometry.transform import InvalidTransformError, Transform
-from mbf_abstract.geometry.transform_buffer import (
+from mbf_abstract.geometry.transform_problems import (
     ConnectivityError,
     ExtrapolationError,
     StaleTransformError,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.goals.goal_types import ActionResult
+from mbf_abstract.goals.result_types import ActionResult
 from mbf_ros.messages.geometry import InvalidValueError, MessageContext, path_of, pose_of
 from mbf_ros.messages.interfaces import Message, MessageError, completed
 

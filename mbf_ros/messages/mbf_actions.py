@@ -5,17 +5,9 @@ Their outcome codes are ours. Fields of ours that a message has no place for are
 
 from __future__ import annotations
 
-from mbf_abstract.goals.goal_types import (
-    ExePathFeedback,
-    ExePathGoal,
-    ExePathResult,
-    GetPathGoal,
-    GetPathResult,
-    MoveBaseGoal,
-    MoveBaseResult,
-    RecoveryGoal,
-    RecoveryResultMessage,
-)
+from mbf_abstract.goals.feedback_types import ExePathFeedback
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
+from mbf_abstract.goals.result_types import ExePathResult, GetPathResult, MoveBaseResult, RecoveryResultMessage
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_ros.messages.action_mapping import ActionMapping, path_or_refuse, pose_or_refuse
 from mbf_ros.messages.geometry import MessageContext, command_twist, path_message, pose_stamped, twist_stamped

@@ -13,18 +13,9 @@ from functools import partial
 from typing import Any
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import (
-    ActionResult,
-    ExePathFeedback,
-    ExePathGoal,
-    ExePathResult,
-    GetPathGoal,
-    GetPathResult,
-    MoveBaseGoal,
-    MoveBaseResult,
-    RefinePathGoal,
-    RefinePathResult,
-)
+from mbf_abstract.goals.feedback_types import ExePathFeedback
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RefinePathGoal
+from mbf_abstract.goals.result_types import ActionResult, ExePathResult, GetPathResult, MoveBaseResult, RefinePathResult
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RefinePathOutcome
 from mbf_ros.messages import nav2_codes as codes
 from mbf_ros.messages.action_mapping import ActionMapping, G, R, RefusedGoal, path_or_refuse, pose_or_refuse

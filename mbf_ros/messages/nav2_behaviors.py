@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
-from mbf_abstract.goals.goal_types import RecoveryGoal, RecoveryResultMessage
+from mbf_abstract.goals.goal_types import RecoveryGoal
+from mbf_abstract.goals.result_types import RecoveryResultMessage
 from mbf_abstract.maps.recoveries.back_up import BackUpRecovery
 from mbf_abstract.maps.recoveries.drive_on_heading import DriveOnHeadingRecovery
 from mbf_abstract.maps.recoveries.rotate import RotateRecovery

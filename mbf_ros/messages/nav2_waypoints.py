@@ -9,14 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import (
-    FollowWaypointsFeedback,
-    FollowWaypointsGoal,
-    FollowWaypointsResult,
-    MoveBaseFeedback,
-    MoveBaseGoal,
-    MoveBaseResult,
-)
+from mbf_abstract.goals.feedback_types import FollowWaypointsFeedback, MoveBaseFeedback
+from mbf_abstract.goals.goal_types import FollowWaypointsGoal, MoveBaseGoal
+from mbf_abstract.goals.result_types import FollowWaypointsResult, MoveBaseResult
 from mbf_abstract.outcomes import GetPathOutcome, MoveBaseOutcome
 from mbf_ros.messages import nav2_codes as codes
 from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal

@@ -15,8 +15,9 @@ from functools import partial
 from typing import Any, TypeAlias
 
 from mbf_abstract.event_values import error_text
-from mbf_abstract.goals.goal_types import ActionResult
-from mbf_abstract.goals.handle import AnyGoalHandle, GoalStatus
+from mbf_abstract.goals.goal_status import GoalStatus
+from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.goals.result_types import ActionResult
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_ros.messages import mbf_actions
 from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal

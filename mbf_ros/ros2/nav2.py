@@ -14,14 +14,10 @@ from typing import Any
 from mbf_abstract.actions.sub_goals import SUB_GOAL_SLOT
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose, normalize_angle
-from mbf_abstract.goals.goal_types import (
-    FollowWaypointsFeedback,
-    FollowWaypointsResult,
-    MoveBaseFeedback,
-    MoveBaseResult,
-    RecoveryGoal,
-)
+from mbf_abstract.goals.feedback_types import FollowWaypointsFeedback, MoveBaseFeedback
+from mbf_abstract.goals.goal_types import RecoveryGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.goals.result_types import FollowWaypointsResult, MoveBaseResult
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.time.clock import Clock

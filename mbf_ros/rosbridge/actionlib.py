@@ -12,8 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from mbf_abstract.goals.goal_types import ExePathFeedback, MoveBaseGoal
-from mbf_abstract.goals.handle import AnyGoalHandle, GoalStatus
+from mbf_abstract.goals.feedback_types import ExePathFeedback
+from mbf_abstract.goals.goal_status import GoalStatus
+from mbf_abstract.goals.goal_types import MoveBaseGoal
+from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_ros.messages.action_mapping import RefusedGoal, pose_or_refuse

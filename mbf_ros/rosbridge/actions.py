@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
-from mbf_abstract.goals.goal_types import ActionResult
-from mbf_abstract.goals.handle import AnyGoalHandle, GoalStatus
+from mbf_abstract.goals.goal_status import GoalStatus
+from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.goals.result_types import ActionResult
 from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message, MessageError

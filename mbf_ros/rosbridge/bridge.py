@@ -9,8 +9,9 @@ from collections.abc import Callable
 
 from mbf_abstract.access.page_access import Role
 from mbf_abstract.access.visitor import HangUp
+from mbf_abstract.event_bus import EventBus
 from mbf_abstract.event_values import error_text
-from mbf_abstract.events import EventBus, EventKind
+from mbf_abstract.events import EventKind
 from mbf_abstract.time.clock import Clock
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.rosbridge.actions import ActionTable, free_id

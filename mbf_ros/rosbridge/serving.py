@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.access.web_socket_server import Offer, WebSocketServer
-from mbf_abstract.events import EventBus
+from mbf_abstract.event_bus import EventBus
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import unix_seconds
 from mbf_abstract.time.ticker import Ticker

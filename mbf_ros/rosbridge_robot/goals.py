@@ -14,7 +14,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from mbf_abstract.goals.goal_types import (
+from mbf_abstract.goals.goal_status import GoalStatus
+from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.goals.result_types import (
     ActionResult,
     ExePathResult,
     FollowWaypointsResult,
@@ -23,7 +25,6 @@ from mbf_abstract.goals.goal_types import (
     RecoveryResultMessage,
     RefinePathResult,
 )
-from mbf_abstract.goals.handle import AnyGoalHandle, GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_ros.messages.action_mapping import RefusedGoal
 from mbf_ros.messages.geometry import MessageContext

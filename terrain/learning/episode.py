@@ -17,7 +17,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.tilt import tilt_of
-from mbf_abstract.goals.goal_types import MoveBaseResult
+from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
 from mbf_abstract.server.map_server import MapServer
 from terrain.learning.observation import Observation, ObservationParameters, Observer

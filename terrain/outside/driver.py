@@ -16,7 +16,7 @@ from typing import Protocol
 from mbf_abstract.drive.commands import stands_still
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Command, Pose, normalize_angle
-from mbf_abstract.goals.goal_types import MoveBaseResult
+from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import Clock, WallClock

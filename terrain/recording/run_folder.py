@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from mbf_abstract.events import Event, EventBus, EventKind
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import FloatArray
 from terrain.recording.metrics import measure
 from terrain.recording.recorded_maps import RecordedMesh

@@ -13,7 +13,7 @@ from enum import Enum
 from typing import Any
 
 from mbf_abstract.event_values import well_formed
-from mbf_abstract.goals.goal_types import MoveBaseResult
+from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.physics.incidents import IncidentKind
 from terrain.scenarios.limits import Limits, broken_limits

@@ -13,7 +13,7 @@ from typing import Any
 
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.geometry import Pose, normalize_angle
-from mbf_abstract.goals.goal_types import MoveBaseResult
+from mbf_abstract.goals.result_types import MoveBaseResult
 from terrain.scenarios.limits import Limits
 from terrain.scenarios.noise import LocalizationNoise
 

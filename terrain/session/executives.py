@@ -21,12 +21,14 @@ from mbf_abstract.event_values import error_text
 from mbf_abstract.executives.reference_trees import READY_TREES, TreeOptions, control_tree, planning_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive, TreeResult
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import MoveBaseGoal, MoveBaseResult
+from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import MoveBaseOutcome
 from mbf_abstract.plugins import PluginKind
-from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase, ClassicSettings
+from terrain.experiments.classic_move_base.settings import ClassicSettings
+from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
 
 EXECUTIVES = ("move_base", "classic", *READY_TREES)
 TreeMaker: TypeAlias = Callable[[TreeOptions], Behaviour]

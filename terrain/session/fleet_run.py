@@ -13,7 +13,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 
-from mbf_abstract.events import JsonLinesSink
+from mbf_abstract.event_sinks import JsonLinesSink
 from mbf_abstract.time.clock import Priority
 from terrain.recording.fleet_metrics import contacts_between, judge_together, together
 from terrain.recording.recording import Recording

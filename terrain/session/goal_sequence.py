@@ -10,8 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import FollowWaypointsFeedback, FollowWaypointsGoal, MoveBaseResult
+from mbf_abstract.goals.feedback_types import FollowWaypointsFeedback
+from mbf_abstract.goals.goal_types import FollowWaypointsGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
 from terrain.session.arrival import Arrival
 from terrain.session.executives import GoalExecutive

@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mbf_abstract.events import EventSink, JsonLinesSink
+from mbf_abstract.event_sinks import JsonLinesSink
+from mbf_abstract.events import EventSink
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.time.clock import wall_seconds

@@ -17,7 +17,7 @@ from mbf_mesh_nav.layers.inflation import InflationLayer
 from mbf_mesh_nav.layers.obstacle import ObstacleLayer
 from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph
-from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters
+from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.plugins import MeshContext

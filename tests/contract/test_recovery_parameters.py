@@ -5,8 +5,8 @@ import math
 import pytest
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import RecoveryGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.testing.conformance.site import site

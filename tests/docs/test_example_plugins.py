@@ -18,7 +18,8 @@ from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.plugins import CostmapContext
-from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.plugins import MeshContext
 

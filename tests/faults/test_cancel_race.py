@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
 from mbf_abstract.plugins import PlanResult, RecoveryResult
 from mbf_abstract.testing.faulty import obedient, slow

@@ -6,8 +6,8 @@ from itertools import product
 import pytest
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal, RefinePathGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.testing.faulty import BusyHang, Hang
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock

@@ -1,8 +1,8 @@
 """Fault table, row 5: a controller hangs while the robot drives."""
 
 from mbf_abstract.events import EventKind
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.testing.faulty import BusyHang, Hang, drive
 from mbf_abstract.testing.scripted_session import ScriptedSession

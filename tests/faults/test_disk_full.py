@@ -4,7 +4,8 @@ import os
 
 import pytest
 
-from mbf_abstract.events import EventKind, JsonLinesSink, read_events
+from mbf_abstract.event_sinks import JsonLinesSink, read_events
+from mbf_abstract.events import EventKind
 from mbf_abstract.testing.scripted_session import ScriptedSession
 
 

@@ -5,8 +5,8 @@ import threading
 import weakref
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import GetPathGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.testing.faulty import Hang
 from mbf_abstract.testing.scripted import straight_plan

@@ -4,8 +4,8 @@ import pytest
 
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import GetPathGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.testing.faulty import BusyHang, Hang, slow
 from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan

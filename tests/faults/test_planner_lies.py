@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from mbf_abstract.events import EventKind, JsonLinesSink, read_events
+from mbf_abstract.event_sinks import JsonLinesSink, read_events
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome, is_success

@@ -3,8 +3,8 @@
 import pytest
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from mbf_abstract.testing.faulty import slow
 from mbf_abstract.testing.scripted import ScriptedController, straight_plan

@@ -7,8 +7,8 @@ import weakref
 import pytest
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.testing.faulty import Hang
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from tests.promises import assert_ended_once

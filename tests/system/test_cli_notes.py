@@ -7,7 +7,8 @@ from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
 from mbf_abstract.maps.layers.layer_list import LayerListError
-from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 NARROW = "global_costmap: layer 'inflation': inflation_radius 0.6 m is smaller than the inscribed radius"

@@ -5,7 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
-from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters
+from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
 from mbf_mesh_nav.tiles.sources import HeightSource
 from terrain.recording.run_folder import read_run

@@ -9,7 +9,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from mbf_abstract.events import EventKind, read_events
+from mbf_abstract.event_sinks import read_events
+from mbf_abstract.events import EventKind
 from terrain.commands.run import register
 from terrain.provenance.rerun import rerun
 from terrain.recording.joint_recording import JointRecording

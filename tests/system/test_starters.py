@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
 from mbf_abstract.commands.starters import starters
-from mbf_mesh_nav.map.map_builder import MeshMapParameters
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
 from mbf_mesh_nav.tiles.sources import HeightSource

@@ -7,7 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
-from mbf_abstract.events import EventKind, read_events
+from mbf_abstract.event_sinks import read_events
+from mbf_abstract.events import EventKind
 from terrain.recording.run_folder import read_run
 from terrain.scenarios.library import LIBRARY
 from terrain.sweeps.log import SweepLog

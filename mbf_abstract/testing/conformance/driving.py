@@ -6,8 +6,9 @@ import math
 from dataclasses import replace
 
 from mbf_abstract.geometry import Path
+from mbf_abstract.goals.feedback_types import MoveBaseFeedback
 from mbf_abstract.goals.goal_area import DiscArea
-from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseFeedback, MoveBaseGoal
+from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
 from mbf_abstract.testing.conformance.rig import START, Box, T_map_dock

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.goals.goal_types import ActionResult
+from mbf_abstract.goals.result_types import ActionResult
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.maps.sensing import RangeScan

@@ -16,13 +16,13 @@ of weighted A* (Pohl 1970), the choice of the side Pohl's (1971).
 from __future__ import annotations
 
 import heapq
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.car.curves import curve_between, sample_word
+from mbf_costmap_nav.kernels.car.curves import sample_word
 from mbf_costmap_nav.kernels.car.ground import Ground, driven_cost
+from mbf_costmap_nav.kernels.car.joints import HEADINGS, FloatArray, Joint, Target, heuristic, try_joints
 from mbf_costmap_nav.kernels.car.motion_primitives import (
     BACKWARD_SIDE,
     FORWARD_MOTIONS,
@@ -31,7 +31,6 @@ from mbf_costmap_nav.kernels.car.motion_primitives import (
     NO_MOTION,
     Car,
     change_of,
-    curve_cost,
     direction_of,
     path_from_root,
     sample_arc,
@@ -42,53 +41,17 @@ from mbf_costmap_nav.kernels.car.state_tree import StateTree, best_state, new_tr
 from mbf_costmap_nav.kernels.compiled import kernel
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FOUND
 
-FloatArray = NDArray[np.float64]
-Field = NDArray[np.float32]
 Heap = list[tuple[float, int]]
 
 GAVE_UP, NEARBY = 3, 4
 """Further states of a finished search: the limit of states was met; a state within the tolerance was taken."""
 
-HEADINGS = 72
-CURVE_RANGE = 3.0
-"""Beyond this many turning radii the free curve adds little to the heuristic and is not computed."""
 HEURISTIC_WEIGHT = 1.5
 """The cost of the arcs found is within about this factor of the best; the fewer states, the larger it is."""
 WORTH_WHILE = 1.1
 """A state replaces the one in its bin only if it is better by this factor; half of all states are spared."""
-ANCESTORS = (1, 2, 4, 8, 16)
-"""How many arcs before and behind a meeting of the trees a curve is tried to join them."""
-MEETINGS_PER_TRY = 8
 SPARE_STATES = 500
 """With a path known, the search for a better one goes on for half of the states so far, and these."""
-
-
-class Target(NamedTuple):
-    """What a tree grows to: the other root's ``pose`` (3,), and the ``field`` (height, width) of costs [m] to it."""
-
-    pose: FloatArray
-    field: Field
-
-
-class Joint(NamedTuple):
-    """The best path so far: its ``cost`` (1,) [m], its ``states`` (2,) of both trees, the ``word`` (5, 2) between."""
-
-    cost: FloatArray
-    states: NDArray[np.int64]
-    word: FloatArray
-
-
-@kernel
-def _heuristic(ground: Ground, car: Car, side: float, pose: FloatArray, target: Target) -> float:
-    """Larger of the field [m] at the pose's cell and the length of the free curve."""
-    geometry = ground.geometry
-    ix, iy = int((pose[0] - geometry[1]) / geometry[0]), int((pose[1] - geometry[2]) / geometry[0])
-    around = float(target.field[iy, ix] * geometry[0])
-    if around > CURVE_RANGE * car.radius:
-        return around
-    ends = (pose, target.pose) if side == FORWARD_SIDE else (target.pose, pose)
-    free_curve = np.abs(curve_between(ends[0], ends[1], car.radius, car.reversing)[:, 1]).sum() * car.radius
-    return float(max(free_curve, around))
 
 
 @kernel
@@ -98,65 +61,6 @@ def _bin_of(ground: Ground, car: Car, pose: FloatArray) -> int:
     ix, iy = int((pose[0] - geometry[1]) / car.bin_size), int((pose[1] - geometry[2]) / car.bin_size)
     heading = int(np.floor(pose[2] / (2.0 * np.pi) * HEADINGS + 0.5)) % HEADINGS
     return ((iy << 28) + ix) * HEADINGS + heading
-
-
-@kernel
-def _join(
-    ground: Ground, car: Car, side: float, tree: StateTree, other: StateTree, states: tuple[int, int], joint: Joint
-) -> None:
-    """Try the free curve between a state of a tree and one of the other; keep it if it is the best path so far."""
-    first, second = (tree, other) if side == FORWARD_SIDE else (other, tree)
-    a, b = states if side == FORWARD_SIDE else (states[1], states[0])
-    limit = joint.cost[0] - first.g[a] - second.g[b]
-    if limit <= 0.0:
-        return
-    word = curve_between(first.poses[a], second.poses[b], car.radius, car.reversing)
-    before, after = direction_of(first.motions[a]), direction_of(second.motions[b])
-    cost = curve_cost(ground, car, first.poses[a], word, before, after, limit)
-    if cost < limit:
-        joint.cost[0] = first.g[a] + cost + second.g[b]
-        joint.states[0], joint.states[1] = a, b
-        joint.word[:] = word
-
-
-@kernel
-def _ancestor(tree: StateTree, state: int, generations: int) -> int:
-    """State so many arcs nearer to the root, or the root."""
-    for _ in range(generations):
-        if tree.parents[state] >= 0:
-            state = tree.parents[state]
-    return state
-
-
-@kernel
-def _try_joints(
-    ground: Ground,
-    car: Car,
-    side: float,
-    trees: tuple[StateTree, StateTree],
-    target: Target,
-    state: int,
-    waits: NDArray[np.int64],
-    joint: Joint,
-) -> None:
-    """Try curves to the other root, more often the nearer it is, and to the other tree where it is met.
-
-    ``waits`` (2,): how many states, and how many meetings, to let pass before the next try of either.
-    """
-    tree, other = trees
-    waits[0] -= 1
-    if waits[0] <= 0:
-        waits[0] = int(_heuristic(ground, car, side, tree.poses[state], target) / (2.0 * car.step))
-        _join(ground, car, side, tree, other, (state, 0), joint)
-    met = best_state(other, tree.bins[state])
-    if met < 0:
-        return
-    waits[1] -= 1
-    if waits[1] <= 0:
-        waits[1] = MEETINGS_PER_TRY
-        for generations in ANCESTORS:
-            ends = (_ancestor(tree, state, generations), _ancestor(other, met, generations))
-            _join(ground, car, side, tree, other, ends, joint)
 
 
 @kernel
@@ -182,7 +86,7 @@ def _grow(
         g_new = g_before + free_cost * (1.0 + car.cost_factor * cost / 252.0)
         if cost < 0.0 or g_known <= g_new:
             continue
-        estimate = _heuristic(ground, car, side, reached, target)
+        estimate = heuristic(ground, car, side, reached, target)
         if estimate < np.inf:
             heapq.heappush(heap, (g_new + HEURISTIC_WEIGHT * estimate, tree.made[0]))
             tree = with_state(tree, reached, g_new, bin_reached, state, motion)
@@ -262,12 +166,12 @@ def hybrid_search(
         if len(other_heap) == 0 or len(heap) <= len(other_heap):
             state = heapq.heappop(heap)[1]
             if best_state(tree, tree.bins[state]) == state:
-                _try_joints(ground, car, FORWARD_SIDE, (tree, other), from_start, state, waits, joint)
+                try_joints(ground, car, FORWARD_SIDE, (tree, other), from_start, state, waits, joint)
                 tree = _grow(ground, car, FORWARD_SIDE, tree, from_start, state, heap, arc)
         else:
             state = heapq.heappop(other_heap)[1]
             if best_state(other, other.bins[state]) == state:
-                _try_joints(ground, car, BACKWARD_SIDE, (other, tree), from_goal, state, other_waits, joint)
+                try_joints(ground, car, BACKWARD_SIDE, (other, tree), from_goal, state, other_waits, joint)
                 other = _grow(ground, car, BACKWARD_SIDE, other, from_goal, state, other_heap, arc)
 
     # 3. The arcs from the start, the curve, the arcs to the goal; without a path the state within the tolerance.

@@ -10,7 +10,6 @@ stack visits a fifth more.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -217,39 +216,3 @@ def repair_distances(
                     tail = after(tail, queue)
                 state[other] = _TOUCHED | _WAITING
     return touched[:size].copy(), Count(flips)
-
-
-@kernel
-def set_fading_costs(
-    distances: Float32Array,
-    touched: IntArray,
-    flips: int,
-    inscribed_radius: float,
-    lethal_value: float,
-    inscribed_value: float,
-    cost_scaling_factor: float,
-    costs: Float32Array,
-) -> IntArray:
-    """Write the costs of the ``touched`` vertices (t,) and return those that differ, and all of the first ``flips``.
-
-    ``lethal_value`` at lethal vertices, ``inscribed_value`` up to the inscribed radius [m], from there on
-    ``inscribed_value * exp(-cost_scaling_factor (d - inscribed_radius))``, 0 at infinite distance; changes ``costs``
-    (V,) in place.
-    """
-    moved = np.empty(len(touched), dtype=np.int32)
-    size = Index(0)
-    for place in range(len(touched)):
-        vertex = Index(touched[place])
-        distance = distances[vertex]
-        cost = inscribed_value
-        if distance == 0.0:
-            cost = lethal_value
-        elif distance == np.inf:
-            cost = 0.0
-        elif distance > inscribed_radius:
-            cost = inscribed_value * math.exp(-cost_scaling_factor * (distance - inscribed_radius))
-        if place < flips or np.float32(cost) != costs[vertex]:
-            costs[vertex] = cost
-            moved[size] = vertex
-            size += ONE
-    return moved[:size].copy()

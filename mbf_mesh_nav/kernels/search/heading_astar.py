@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
-from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, Scratch, edge_use, stride_use
+from mbf_mesh_nav.kernels.layers.chassis import Chassis, Scratch
+from mbf_mesh_nav.kernels.layers.footprint_sweep import edge_use, stride_use
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 from mbf_mesh_nav.kernels.search.goal_bound import GoalBound, bound_at

@@ -28,7 +28,7 @@ from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.server.plugin_host import ServerError
-from mbf_mesh_nav.map.map_builder import MeshLayerEntry
+from mbf_mesh_nav.map.map_parameters import MeshLayerEntry
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.robot_outline import OutlineParameters, changes_of_radius
 from mbf_mesh_nav.mesh.mesh_report import MeshError

@@ -18,82 +18,27 @@ the server's business. During ``run`` the server's own retries and oscillation w
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from enum import Enum
-
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.executives.conditions import TIME_RESOLUTION
 from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import ActionResult, ExePathFeedback, ExePathGoal, MoveBaseResult, RecoveryGoal
+from mbf_abstract.goals.feedback_types import ExePathFeedback
+from mbf_abstract.goals.goal_types import ExePathGoal, RecoveryGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.goals.result_types import ActionResult, MoveBaseResult
 from mbf_abstract.navigator import Navigator
-from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome, is_success
+from mbf_abstract.outcomes import MoveBaseOutcome, is_success
 from mbf_abstract.plugins import PluginKind
+from terrain.experiments.classic_move_base.mailbox import Mailbox
 from terrain.experiments.classic_move_base.planner import ClassicPlanner
-
-CANNOT_FOLLOW = (
-    ExePathOutcome.INVALID_PATH,
-    ExePathOutcome.INVALID_PLUGIN,
-    ExePathOutcome.NOT_INITIALIZED,
-    ExePathOutcome.INTERNAL_ERROR,
+from terrain.experiments.classic_move_base.settings import (
+    ABORT_OUTCOMES,
+    CANNOT_FOLLOW,
+    ClassicSettings,
+    ClassicState,
+    Trigger,
 )
-
-
-class ClassicState(Enum):
-    """The three states of move_base."""
-
-    PLANNING = "planning"
-    CONTROLLING = "controlling"
-    CLEARING = "clearing"
-
-
-class Trigger(Enum):
-    """What made the last recovery necessary; the value is the message of an abort."""
-
-    PLANNING = "Failed to find a valid plan. Even after executing recovery behaviors."
-    CONTROLLING = "Failed to find a valid control. Even after executing recovery behaviors."
-    OSCILLATION = "Robot is oscillating. Even after executing recovery behaviors."
-
-
-ABORT_OUTCOMES = {
-    Trigger.PLANNING: MoveBaseOutcome.PLAN_FAILURE,
-    Trigger.CONTROLLING: MoveBaseOutcome.CTRL_FAILURE,
-    Trigger.OSCILLATION: MoveBaseOutcome.OSCILLATION,
-}
-
-
-@dataclass(frozen=True)
-class ClassicSettings:
-    """The parameters of move_base, with the values of a fresh start.
-
-    Attributes
-    ----------
-    planner_frequency, controller_frequency : float
-        [Hz]; a planner_frequency of 0 plans once, and again after a failure of control.
-    planner_patience, controller_patience : float
-        Time [s] without a plan, without a valid command, before a recovery.
-    max_planning_retries : int
-        Failed plans before a recovery; negative = only patience counts.
-    recovery_behaviors : tuple of str, optional
-        Names in their fixed order; None = all that are loaded.
-    oscillation_timeout, oscillation_distance : float
-        Recover if the robot has not moved this far [m] in this time [s]; 0 s = never.
-    """
-
-    planner_frequency: float = 0.0
-    controller_frequency: float = 20.0
-    planner_patience: float = 5.0
-    controller_patience: float = 15.0
-    max_planning_retries: int = -1
-    recovery_behavior_enabled: bool = True
-    recovery_behaviors: tuple[str, ...] | None = None
-    oscillation_timeout: float = 0.0
-    oscillation_distance: float = 0.5
 
 
 class ClassicMoveBase:
@@ -106,45 +51,36 @@ class ClassicMoveBase:
     """
 
     def __init__(
-        self,
-        navigator: Navigator,
-        settings: ClassicSettings = ClassicSettings(),
-        planner: str = "",
-        controller: str = "",
+        self, navigator: Navigator, settings: ClassicSettings | None = None, planner: str = "", controller: str = ""
     ) -> None:
-        self.settings = settings
+        self.settings = settings or ClassicSettings()
         self._navigator = navigator
         self._planner_name = planner
         self._controller_name = controller
         self._server = navigator.server
         self._clock = navigator.server.runtime.clock
-        self._condition = self._clock.condition()
-        self._mailbox: deque[tuple[AnyGoalHandle, ExePathFeedback | None]] = deque()
-        self._cancel_reason = ""
+        self._mailbox = Mailbox(self._clock)
 
     # ----------------------------------------------------------------------------------------- client
     def run(self, target: Pose) -> MoveBaseResult:
         """Go to ``target``; returns when the goal has ended, with the robot standing and no goal left."""
         self._begin(target)
         try:
-            with self._own_parameters():
+            with self.settings.imposed_on(self._server):
                 end = self._work()
         finally:
-            self._mission.end_goals(self._cancel_reason or "move_base is over")
+            self._mission.end_goals(self._mailbox.closed or "move_base is over")
         return self._result(end, target)
 
     def cancel(self, reason: str = "canceled from outside") -> None:
         """End the present run soon; may be called from any thread, never waits."""
-        with self._condition:
-            self._cancel_reason = reason
-            self._condition.notify_all()
+        self._mailbox.close(reason)
 
     # --------------------------------------------------------------------------------------- the loop
     def _begin(self, target: Pose) -> None:
         """A new goal: everything starts afresh, the list of recoveries too."""
         now = self._clock.now()
-        self._cancel_reason = ""
-        self._mailbox.clear()
+        self._mailbox.open()
         self._mission = MissionContext(self._navigator, target)
         self._planner = ClassicPlanner(self._mission, self._planner_name, self.settings.planner_frequency, self._post)
         self._planner.wake()
@@ -164,10 +100,10 @@ class ClassicMoveBase:
         end: ActionResult | None = None
         next_cycle = self._clock.now()
         while end is None:
-            if self._cancel_reason:
-                return ActionResult(MoveBaseOutcome.CANCELED, self._cancel_reason)
+            if self._mailbox.closed:
+                return ActionResult(MoveBaseOutcome.CANCELED, self._mailbox.closed)
             self._planner.start_if_due()
-            message = self._next_message(min(next_cycle, self._planner.due))
+            message = self._mailbox.next(min(next_cycle, self._planner.due))
             if message is not None:
                 end = self._react(*message)
             elif self._clock.now() >= next_cycle - TIME_RESOLUTION:
@@ -175,16 +111,8 @@ class ClassicMoveBase:
                 end = self._cycle()
         return end
 
-    def _next_message(self, deadline: float) -> tuple[AnyGoalHandle, ExePathFeedback | None] | None:
-        with self._condition:
-            while not self._mailbox and not self._cancel_reason and self._clock.now() < deadline - TIME_RESOLUTION:
-                self._condition.wait(deadline - self._clock.now())
-            return self._mailbox.popleft() if self._mailbox else None
-
     def _post(self, handle: AnyGoalHandle) -> None:
-        with self._condition:
-            self._mailbox.append((handle, None if handle.done else handle.feedback))
-            self._condition.notify_all()
+        self._mailbox.post(handle)
 
     def _react(self, handle: AnyGoalHandle, feedback: ExePathFeedback | None) -> ActionResult | None:
         if handle is self._drive:
@@ -310,33 +238,9 @@ class ClassicMoveBase:
 
     def _enter(self, state: ClassicState) -> None:
         if state is not self._state:
-            self._server.runtime.events.emit(
-                EventKind.STATE_CHANGED,
-                "classic_move_base",
-                old=self._state.value,
-                new=state.value,
-                trigger=self._trigger.name.lower(),
-            )
+            change = {"old": self._state.value, "new": state.value, "trigger": self._trigger.name.lower()}
+            self._server.runtime.events.emit(EventKind.STATE_CHANGED, "classic_move_base", **change)
             self._state = state
-
-    # ---------------------------------------------------------------------------------------- the rest
-    @contextmanager
-    def _own_parameters(self) -> Iterator[None]:
-        """One plugin call a goal, and no second watch: patience, retries and oscillation are decided here."""
-        ours = {
-            "planner_max_retries": 0,
-            "planner_patience": 0.0,
-            "controller_max_retries": 0,
-            "controller_patience": self.settings.controller_patience,
-            "controller_frequency": self.settings.controller_frequency,
-            "oscillation_timeout": 0.0,
-        }
-        before = {name: getattr(self._server.runtime.parameters, name) for name in ours}
-        self._server.set_parameters(**ours)
-        try:
-            yield
-        finally:
-            self._server.set_parameters(**before)
 
     def _result(self, end: ActionResult, target: Pose) -> MoveBaseResult:
         try:

@@ -12,7 +12,8 @@ from typing import Literal
 from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.navigator import Navigator
-from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase, ClassicSettings
+from terrain.experiments.classic_move_base.settings import ClassicSettings
+from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
 from terrain.experiments.table1.filtered_move_base import FilteredMoveBase
 
 RECOVERIES = ("clear_costmaps", "relax_planner", "out_of_collision", "relax_controller", "escape_distance")

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from mbf_abstract.executives.reference_trees import BLOCKED, IN_CONTACT, OFF_THE_PATH
 from mbf_abstract.goals.handle import AnyGoalHandle
-from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase, Trigger
+from terrain.experiments.classic_move_base.settings import Trigger
+from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
 
 UNABLE_TO_PLAN = ("clear_costmaps", "relax_planner", "escape_distance")
 FITTING = (

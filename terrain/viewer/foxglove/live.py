@@ -13,8 +13,9 @@ from typing import Protocol
 from mbf_abstract.access.foxglove import FoxgloveOptions, report_addresses
 from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.access.web_socket_server import Offer, WebSocketServer
+from mbf_abstract.event_bus import EventBus
 from mbf_abstract.event_values import error_text
-from mbf_abstract.events import Event, EventBus
+from mbf_abstract.events import Event
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.pace import Pace
 from terrain.recording.recording import Recording

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from mbf_abstract.events import MemorySink
+from mbf_abstract.event_sinks import MemorySink
 from mbf_abstract.geometry import Pose
 from mbf_ros.rosbridge_robot.options import TimeSource
 

@@ -6,8 +6,9 @@ import gc
 import pytest
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.awaiting import awaited
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
@@ -85,7 +86,7 @@ def test_an_event_loop_that_is_closed_first_harms_neither_the_goal_nor_others():
     with ScriptedSession(clock=WallClock()) as session:
         handle = session.navigator.send(ExePathGoal(session.path_to(0.4)))
         loop = asyncio.new_event_loop()
-        task = loop.create_task(handle._wait_async())
+        task = loop.create_task(awaited(handle, session.navigator.server.runtime.clock))
         loop.run_until_complete(asyncio.sleep(0.02))
         loop.close()
         assert handle.wait(10.0).success

@@ -4,8 +4,8 @@ import pytest
 
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome as Outcome
 from mbf_abstract.testing.faulty import Hang, drive, slow
 from mbf_abstract.testing.scripted import ScriptedController

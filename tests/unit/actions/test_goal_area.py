@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.goals.goal_area import DiscArea, PolygonArea, PoseSetArea
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing.scripted import straight_plan

@@ -8,8 +8,8 @@ import pytest
 
 from mbf_abstract import outcomes
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import MoveBaseGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import (
     ExePathOutcome,
     GetPathOutcome,

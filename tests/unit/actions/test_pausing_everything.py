@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import MoveBaseGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.plugins import RecoveryResult
 from mbf_abstract.testing.faulty import slow
 from mbf_abstract.testing.scripted import straight_plan

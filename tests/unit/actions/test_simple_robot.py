@@ -7,8 +7,8 @@ import pytest
 
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal, RefinePathGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_abstract.plugins import RecoveryResult
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery

@@ -9,8 +9,8 @@ import pytest
 
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import GetPathGoal, MoveBaseGoal, RecoveryGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import GetPathOutcome as Outcome
 from mbf_abstract.plugins import PlanResult, PluginKind
 from mbf_abstract.testing.faulty import Hang, obedient, slow

@@ -5,8 +5,8 @@ import asyncio
 import pytest
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import FollowWaypointsGoal, MoveBaseGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult
 from mbf_abstract.testing.faulty import BusyHang, Hang

@@ -4,8 +4,10 @@ import threading
 import numpy as np
 import pytest
 
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.event_sinks import JsonLinesSink, MemorySink, read_events
 from mbf_abstract.event_values import error_text, to_json_value
-from mbf_abstract.events import Event, EventBus, EventKind, JsonLinesSink, MemorySink, read_events
+from mbf_abstract.events import Event, EventKind
 from mbf_abstract.outcomes import GetPathOutcome
 
 

@@ -10,15 +10,14 @@ from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw, rotation_matrix
 from mbf_abstract.geometry.transform import InvalidTransformError, Transform, TransformError, rotate, slerp
-from mbf_abstract.geometry.transform_buffer import (
-    MAX_PENDING_REQUESTS,
+from mbf_abstract.geometry.transform_buffer import MAX_PENDING_REQUESTS, TransformBuffer
+from mbf_abstract.geometry.transform_cache import MAX_SAMPLES, TransformCache
+from mbf_abstract.geometry.transform_problems import (
     ConnectivityError,
     ExtrapolationError,
     StaleTransformError,
-    TransformBuffer,
     UnknownFrameError,
 )
-from mbf_abstract.geometry.transform_cache import MAX_SAMPLES, TransformCache
 
 NANO = 2.0**-30  # about a nanosecond, and a binary fraction, so that sums of stamps are exact
 

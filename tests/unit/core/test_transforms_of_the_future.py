@@ -3,7 +3,8 @@
 import pytest
 
 from mbf_abstract.geometry.transform import Transform, TransformError
-from mbf_abstract.geometry.transform_buffer import MAX_LEAD, StaleTransformError, TransformBuffer
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.geometry.transform_problems import MAX_LEAD, StaleTransformError
 
 UNIX = 1.79e9  # time.time() where the clock began at zero
 

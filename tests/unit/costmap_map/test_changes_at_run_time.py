@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from mbf_abstract.events import EventBus, EventKind, MemorySink
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.event_sinks import MemorySink
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator

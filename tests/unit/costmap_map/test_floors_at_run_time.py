@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mbf_abstract.config.findings import ConfigError
-from mbf_abstract.events import EventBus, EventKind, MemorySink
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.event_sinks import MemorySink
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer

@@ -7,10 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_abstract.events import EventBus, EventKind, MemorySink
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.event_sinks import MemorySink
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, quaternion_from_yaw
 from mbf_abstract.geometry.transform import Transform, TransformError
-from mbf_abstract.geometry.transform_buffer import ExtrapolationError, TransformBuffer
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.geometry.transform_problems import ExtrapolationError
 from mbf_abstract.maps.scan_intake import MAX_SOURCES
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator

@@ -7,7 +7,9 @@ import pytest
 from mbf_abstract.drive.commands import command_problem, stands_still
 from mbf_abstract.drive.velocity_gate import VelocityGate
 from mbf_abstract.drive.velocity_limits import VelocityLimits
-from mbf_abstract.events import EventBus, EventKind, MemorySink
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.event_sinks import MemorySink
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import AckermannCommand, Twist
 from mbf_abstract.time.clock import Priority
 from mbf_abstract.time.sim_clock import SimClock

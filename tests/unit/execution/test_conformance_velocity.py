@@ -8,7 +8,7 @@ import pytest
 from mbf_abstract.drive.robot import Odometry, RobotInformation
 from mbf_abstract.drive.velocity_gate import VelocityGate
 from mbf_abstract.drive.velocity_limits import VelocityLimits
-from mbf_abstract.events import EventBus
+from mbf_abstract.event_bus import EventBus
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses, in_robot_frame
 from mbf_abstract.geometry.transform_buffer import TransformBuffer

@@ -10,8 +10,8 @@ from mbf_abstract.execution.controller_state import Plan
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
 from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome as Outcome
 from mbf_abstract.plugins import ControlResult, PluginKind
 from mbf_abstract.testing.faulty import drive, nan_command, no_command, slow

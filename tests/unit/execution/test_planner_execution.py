@@ -4,8 +4,8 @@ import pytest
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_area import DiscArea
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import GetPathGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import GetPathOutcome as Outcome
 from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing.faulty import empty_path, obedient, slow, wrong_frame_path

@@ -3,8 +3,8 @@
 import pytest
 
 from mbf_abstract.geometry import Path, Twist
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import RecoveryGoal, RefinePathGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import RecoveryOutcome, RefinePathOutcome
 from mbf_abstract.plugins import RecoveryResult, RefineResult
 from mbf_abstract.testing.faulty import Hang, obedient, slow

@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 
 from mbf_abstract.drive.velocity_gate import VelocityGate
 from mbf_abstract.drive.velocity_limits import VelocityLimits
-from mbf_abstract.events import EventBus, EventKind, MemorySink
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.event_sinks import MemorySink
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import AckermannCommand, Twist
 from mbf_abstract.time.sim_clock import SimClock
 

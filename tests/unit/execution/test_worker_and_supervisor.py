@@ -2,7 +2,9 @@
 
 import pytest
 
-from mbf_abstract.events import EventBus, EventKind, MemorySink
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.event_sinks import MemorySink
+from mbf_abstract.events import EventKind
 from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.execution.worker import Worker
 from mbf_abstract.goals.callbacks import CallbackThread

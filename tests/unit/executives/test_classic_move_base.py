@@ -9,7 +9,8 @@ from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult
 from mbf_abstract.testing.faulty import drive
 from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.time.clock import Priority
-from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase, ClassicSettings
+from terrain.experiments.classic_move_base.settings import ClassicSettings
+from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
 
 GOAL = Pose.planar(2.0, 0.0)
 NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")

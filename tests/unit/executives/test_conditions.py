@@ -8,9 +8,10 @@ from mbf_abstract.executives.conditions import Do, GoalReached, TruncatePath, Wo
 from mbf_abstract.executives.leaves import ExePath, GetPath
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.goals.goal_types import ActionResult
+from mbf_abstract.goals.result_types import ActionResult
 from mbf_abstract.outcomes import GetPathOutcome
-from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase, ClassicSettings
+from terrain.experiments.classic_move_base.settings import ClassicSettings
+from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
 
 GOAL = Pose.planar(2.0, 0.0)
 

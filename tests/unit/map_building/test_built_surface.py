@@ -13,7 +13,8 @@ from mbf_mesh_nav.building.surface import SurfaceParameters, build_surface, cell
 from mbf_mesh_nav.kernels.building.columns import LOWEST, SLAB, TOP, sort_into_cells, split_columns
 from mbf_mesh_nav.kernels.building.patches import STEP_X, STEP_Y, link_patches
 from mbf_mesh_nav.kernels.building.quads import fitted_heights
-from mbf_mesh_nav.map.map_builder import build_mesh_map, default_layers
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import default_layers
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 

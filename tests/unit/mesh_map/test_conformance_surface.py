@@ -14,7 +14,8 @@ from mbf_mesh_nav.layers.keepout import KeepoutLayer
 from mbf_mesh_nav.layers.label import LabelLayer
 from mbf_mesh_nav.layers.steepness import SteepnessLayer
 from mbf_mesh_nav.map.layer import LayerContext
-from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.repair import MeshError

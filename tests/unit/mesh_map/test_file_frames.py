@@ -10,7 +10,8 @@ from mbf_abstract.server.factory import read_config
 from mbf_abstract.server.standing_server import standing_server
 from mbf_mesh_nav.files.file_frames import FileFrame, file_frame, on_the_map
 from mbf_mesh_nav.files.mesh_io import read_mesh
-from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map, default_layers
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters, default_layers
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 

@@ -17,7 +17,8 @@ from mbf_mesh_nav.layers.steepness import SteepnessLayer
 from mbf_mesh_nav.layers.tilt import HEADINGS, TiltLayer
 from mbf_mesh_nav.map.height_error import slope_error
 from mbf_mesh_nav.map.layer import LayerContext
-from mbf_mesh_nav.map.map_builder import build_mesh_map, default_layers
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import default_layers
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.mesh_report import MeshError

@@ -13,7 +13,8 @@ from mbf_abstract.navigator import Navigator
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.time.sim_clock import SimClock
 from mbf_mesh_nav.files.mesh_io import read_mesh
-from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.repair import MeshError
 

@@ -6,7 +6,8 @@ import pytest
 
 from mbf_mesh_nav.files.lvr2_io import LAYOUTS, write_lvr2_map, write_lvr2_mesh
 from mbf_mesh_nav.files.mesh_io import read_mesh
-from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.repair import MeshError
 

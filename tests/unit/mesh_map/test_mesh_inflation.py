@@ -11,7 +11,8 @@ from mbf_mesh_nav.kernels.layers.inflation import front_arrival, update_sources
 from mbf_mesh_nav.layers.inflation import InflationLayer, InflationParameters
 from mbf_mesh_nav.layers.keepout import KeepoutLayer, KeepoutParameters
 from mbf_mesh_nav.map.layer import LayerContext
-from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 

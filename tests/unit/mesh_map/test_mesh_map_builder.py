@@ -15,11 +15,8 @@ from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_mesh_nav.files.lvr2_io import write_lvr2_mesh
 from mbf_mesh_nav.files.mesh_io import read_mesh
 from mbf_mesh_nav.layers.roughness import RoughnessLayer
-from mbf_mesh_nav.map.map_builder import (
-    MeshMapParameters,
-    build_mesh_map,
-    default_layers,
-)
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters, default_layers
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.repair import MeshError
 

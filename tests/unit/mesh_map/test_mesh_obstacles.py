@@ -5,7 +5,8 @@ import pytest
 
 from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.range_image import RangeImage
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh

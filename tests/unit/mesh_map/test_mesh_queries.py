@@ -10,7 +10,8 @@ from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_mesh_nav.map.layer import MeshLayer
-from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 

@@ -8,7 +8,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from mbf_mesh_nav.files.mesh_io import read_mesh
-from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.repair import MeshError, checked_mesh
 

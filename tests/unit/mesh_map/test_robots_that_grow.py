@@ -8,7 +8,7 @@ from mbf_mesh_nav.layers.moving_obstacles import MovingObstaclesLayer
 from mbf_mesh_nav.layers.obstacle import ObstacleLayer
 from mbf_mesh_nav.map.layer import LayerContext
 from mbf_mesh_nav.map.layer_graph import LayerGraph
-from mbf_mesh_nav.map.map_builder import MeshMapParameters
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
 

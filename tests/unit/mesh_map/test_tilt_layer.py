@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_mesh_nav.layers.tilt import HEADINGS, TiltLayer, TiltParameters, heading_index
 from mbf_mesh_nav.map.layer import LayerContext
-from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.kernels.layers.footprint_sweep import scratch_for
+from mbf_mesh_nav.kernels.layers.chassis import scratch_for
 from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, FORBIDDEN, find_out_along
 from mbf_mesh_nav.layers.tilt import TiltLayer, TiltParameters
 from mbf_mesh_nav.map.layer import LayerContext

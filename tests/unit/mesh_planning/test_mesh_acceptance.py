@@ -4,7 +4,8 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
 

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.tracking.contact import RobotBox
-from mbf_mesh_nav.map.map_builder import MeshMapParameters
+from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.turning import points_on
 

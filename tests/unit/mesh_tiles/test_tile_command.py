@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 from mbf_abstract.cli import make_app
 from mbf_mesh_nav.building.map_build import write_map
 from mbf_mesh_nav.files.map_header import MapHeader
-from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.mesh.densify import densify
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.repair import checked_mesh

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 from tiled_terrains import PARAMETERS, SPACING, WholeMap, settings, terrain
 
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters
+from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.tiles import corridor_search, pool
 from mbf_mesh_nav.tiles.build import TileSettings, build_tiles

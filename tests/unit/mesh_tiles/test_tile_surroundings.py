@@ -14,7 +14,7 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_abstract.time.cancel import CancelToken
-from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters
+from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.planners.hierarchical import HierarchicalPlanner

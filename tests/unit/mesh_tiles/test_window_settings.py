@@ -10,7 +10,7 @@ from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_mesh_nav.layers.obstacle import ObstacleLayer
 from mbf_mesh_nav.map.layer import MeshLayer
-from mbf_mesh_nav.map.map_builder import MeshLayerEntry
+from mbf_mesh_nav.map.map_parameters import MeshLayerEntry
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
 from mbf_mesh_nav.tiles.serving.window_settings import SHOWN, window_settings
 from mbf_mesh_nav.tiles.tiled_map import TiledMap

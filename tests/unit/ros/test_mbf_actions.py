@@ -10,17 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
-from mbf_abstract.goals.goal_types import (
-    ExePathFeedback,
-    ExePathGoal,
-    ExePathResult,
-    GetPathGoal,
-    GetPathResult,
-    MoveBaseGoal,
-    MoveBaseResult,
-    RecoveryGoal,
-    RecoveryResultMessage,
-)
+from mbf_abstract.goals.feedback_types import ExePathFeedback
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
+from mbf_abstract.goals.result_types import ExePathResult, GetPathResult, MoveBaseResult, RecoveryResultMessage
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_ros.messages import mbf_actions as mbf
 from mbf_ros.messages.action_mapping import RefusedGoal

@@ -5,14 +5,12 @@ from functools import partial
 import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.goals.goal_types import (
-    ExePathFeedback,
+from mbf_abstract.goals.feedback_types import ExePathFeedback, FollowWaypointsFeedback, MoveBaseFeedback
+from mbf_abstract.goals.goal_types import MoveBaseGoal
+from mbf_abstract.goals.result_types import (
     ExePathResult,
-    FollowWaypointsFeedback,
     FollowWaypointsResult,
     GetPathResult,
-    MoveBaseFeedback,
-    MoveBaseGoal,
     MoveBaseResult,
     RefinePathResult,
 )

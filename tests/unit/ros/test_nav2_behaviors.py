@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbf_abstract.goals.goal_types import RecoveryResultMessage
+from mbf_abstract.goals.result_types import RecoveryResultMessage
 from mbf_abstract.maps.recoveries.back_up import BackUpParameters
 from mbf_abstract.maps.recoveries.drive_on_heading import DriveOnHeadingParameters
 from mbf_abstract.maps.recoveries.rotate import RotateParameters

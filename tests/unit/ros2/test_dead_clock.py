@@ -7,8 +7,8 @@ import pytest
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import MoveBaseGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.server.factory import read_config
 from mbf_ros.ros2.clock import SimulatedRosClock
 from mbf_ros.ros2.robot import Arrivals, Frames

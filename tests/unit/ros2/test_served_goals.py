@@ -6,7 +6,8 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import FollowWaypointsFeedback, FollowWaypointsGoal
+from mbf_abstract.goals.feedback_types import FollowWaypointsFeedback
+from mbf_abstract.goals.goal_types import FollowWaypointsGoal
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from mbf_ros.messages import mbf_actions, nav2_waypoints
 from mbf_ros.messages.geometry import MessageContext

@@ -7,7 +7,7 @@ import pytest
 
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import MoveBaseResult
+from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
 from terrain.scenarios.faults import LocalizationJump
 from terrain.scenarios.limits import Limits

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mbf_abstract.goals.goal_types import MoveBaseResult
+from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from terrain.physics.incidents import IncidentKind
 from terrain.recording.verdict import UNFINISHED, Level, judge

@@ -12,7 +12,8 @@ from mbf_abstract.maps.layers.layer_list import LayerEntry
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import build_mesh_map
+from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 PERIOD = 0.1

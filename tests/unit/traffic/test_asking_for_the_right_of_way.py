@@ -8,8 +8,8 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import MoveBaseGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult, PluginKind
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, straight_plan

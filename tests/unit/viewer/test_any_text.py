@@ -13,9 +13,11 @@ from typer.testing import CliRunner
 from mbf_abstract.cli import make_app
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.config.yaml_source import load_yaml
-from mbf_abstract.events import EventBus, EventKind, MemorySink
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.event_sinks import MemorySink
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.goals.goal_types import MoveBaseResult
+from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.whole_files import replacing, write_whole
 from terrain.commands.live_line import LiveLine
 from terrain.physics.robot_models import HUSKY

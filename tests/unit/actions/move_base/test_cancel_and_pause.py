@@ -3,7 +3,7 @@
 import pytest
 
 from mbf_abstract.geometry import Twist
-from mbf_abstract.goals.handle import GoalStatus
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.outcomes import GetPathOutcome, RecoveryOutcome
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
 from mbf_abstract.plugins import PlanResult, RecoveryResult

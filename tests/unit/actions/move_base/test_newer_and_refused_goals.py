@@ -4,8 +4,8 @@ import pytest
 
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import MoveBaseGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
 from mbf_abstract.plugins import RecoveryResult
 from mbf_abstract.testing.faulty import slow

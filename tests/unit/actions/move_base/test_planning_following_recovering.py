@@ -6,7 +6,7 @@ import pytest
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.arrival_tolerance import planned_tolerance
-from mbf_abstract.goals.handle import GoalStatus
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
 from mbf_abstract.plugins import ControlResult, RecoveryResult

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path
-from mbf_abstract.goals.handle import GoalStatus
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import RefineResult

@@ -3,7 +3,7 @@
 import pytest
 
 from mbf_abstract.events import EventKind
-from mbf_abstract.goals.handle import GoalStatus
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
 from mbf_abstract.plugins import ControlResult, RecoveryResult

@@ -12,8 +12,8 @@ from mbf_abstract.actions.via_poses import ViaPoses, rests_along
 from mbf_abstract.execution.path_tracker import SAME_PLACE
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_area import DiscArea
+from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import MoveBaseGoal
-from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
 from mbf_abstract.plugins import ControlResult

@@ -11,7 +11,8 @@ import yaml
 from PIL import Image
 
 import terrain
-from mbf_abstract.events import EventKind, read_events
+from mbf_abstract.event_sinks import read_events
+from mbf_abstract.events import EventKind
 
 pytestmark = pytest.mark.timeout(300)
 

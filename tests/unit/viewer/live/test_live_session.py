@@ -7,7 +7,8 @@ from functools import partial
 
 import pytest
 
-from mbf_abstract.events import EventKind, read_events
+from mbf_abstract.event_sinks import read_events
+from mbf_abstract.events import EventKind
 from mbf_abstract.time.clock import WallClock
 from terrain.session.executives import EXECUTIVES, make_executive
 from terrain.session.goal_sequence import GoalSequence
