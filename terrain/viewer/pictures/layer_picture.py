@@ -20,6 +20,7 @@ from terrain.viewer.pictures.raster import paint_triangles
 NOWHERE = (232, 232, 232)
 PIXELS = 640  # along the longer side of a panel
 PANEL = 3.6  # inches
+TITLE = 0.35  # inches above a panel
 MOST_COLUMNS = 4
 PLAN_WIDTH = 1.6
 
@@ -48,13 +49,13 @@ def layer_picture_png(recording: Recording, names: Sequence[str] = ()) -> bytes:
     except ImportError as error:
         raise ViewerMissing(f"pictures need matplotlib: pip install 'mbf-flex[sim]' ({error})") from error
     shown = shown_layers(recording.layers, names)
-    columns = min(len(shown), MOST_COLUMNS) or 1
-    rows = -(-len(shown) // columns) or 1
+    rows = -(-len(shown) // MOST_COLUMNS) or 1
+    columns = -(-len(shown) // rows) or 1
     surface = recording.meshes[0]
     (x_min, y_min), (x_max, y_max) = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
     extent: Extent = (float(x_min), float(x_max), float(y_min), float(y_max))
     height = PANEL * (extent[3] - extent[2]) / (extent[1] - extent[0])
-    figure = Figure((PANEL * columns, (height + 0.8) * rows), dpi=DOTS_PER_INCH, layout="constrained")
+    figure = Figure((PANEL * columns, (height + TITLE) * rows), dpi=DOTS_PER_INCH, layout="constrained")
     FigureCanvasAgg(figure)
     for number, layer in enumerate(shown):
         axes = figure.add_subplot(rows, columns, number + 1)

@@ -21,7 +21,7 @@ def map_png(log: DriveLog, time: float, view: MapView) -> bytes:
     if recent:
         points = np.concatenate(recent)
         axes.plot(points[:, 0], points[:, 1], ".", color=np.array(SCAN) / 255.0, markersize=2, label="scan", zorder=3)
-    draw_paths(axes, [path for path in log.paths if path[0] <= time])
+    draw_paths(axes, [points for when, points in log.paths if when <= time])
     draw_track(axes, log.poses[log.times <= time], log.outline)
     if len(log.times):
         draw_marks(axes, log.start, log.goals)

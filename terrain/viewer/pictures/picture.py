@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
+from collections.abc import Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
-from terrain.recording.recording import StampedPoints
 from terrain.viewer.pictures.colours import DRIVEN, GOAL, PLANNED, START, Colour
 from terrain.viewer.pictures.raster import paint_triangles
 
@@ -24,6 +24,8 @@ DOTS_PER_INCH = 130
 FINER = 2  # pixels of painted triangles in one of the picture, along each side
 MOST_PIXELS = 4000
 COMPRESSION = 4  # as small as level 6, matplotlib's own, in half of the time
+PLAN_WIDTH = 3.6  # points
+FAINT = 0.35  # opacity of the plans before the last one
 HALO = 1.6  # points of white around lines, so that they show on any ground
 
 
@@ -121,12 +123,28 @@ def draw_line(axes: Axes, points: FloatArray, colour: Colour, width: float, **st
     line.set_path_effects(effects)
 
 
-def draw_paths(axes: Axes, paths: list[StampedPoints]) -> None:
-    """Draw the last plan strong and those before it faint; wide, so that it shows beside the track upon it."""
-    for _, points in paths[:-1]:
-        axes.plot(points[:, 0], points[:, 1], color=np.array(PLANNED) / 255.0, linewidth=1.0, alpha=0.35, zorder=4)
-    for _, points in paths[-1:]:
-        draw_line(axes, points, PLANNED, 3.6, zorder=5, label="plan")
+def draw_paths(
+    axes: Axes, paths: Sequence[FloatArray], colour: Colour = PLANNED, prefix: str = "", linestyle: Any = "-"
+) -> None:
+    """Draw the last plan strong and those before it faint; wide, so that it shows beside the track upon it.
+
+    Parameters
+    ----------
+    paths : sequence of (n, 2 or 3) float64
+        In the order they were made [m]; nan parts a line.
+    prefix : str
+        Of their names in the legend, which are "plan" and, if any before it is to be seen, "earlier plans".
+    """
+    named = f"{prefix}earlier plans"
+    for points in paths[:-1]:
+        (line,) = axes.plot(
+            points[:, 0], points[:, 1], color=np.array(colour) / 255.0, linewidth=1.0, alpha=FAINT, zorder=4
+        )
+        if named and np.isfinite(points[:, 0]).any():
+            line.set_label(named)
+            named = ""
+    for points in paths[-1:]:
+        draw_line(axes, points, colour, PLAN_WIDTH, zorder=5, label=f"{prefix}plan", linestyle=linestyle)
 
 
 def draw_track(

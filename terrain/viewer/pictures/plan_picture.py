@@ -33,7 +33,7 @@ def write_plan_picture(
     if view is not None:
         draw_map(axes, view)
     if path is not None:
-        draw_paths(axes, [(0.0, path.positions)])
+        draw_paths(axes, [path.positions])
     draw_marks(axes, start, (goal,))
     length = "no path" if path is None else f"{path.length:.2f} m, {len(path)} poses"
     axes.set_title(f"{title} · {length}", loc="left", fontsize=11, fontweight="bold", parse_math=False)

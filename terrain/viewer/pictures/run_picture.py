@@ -27,8 +27,8 @@ from terrain.viewer.pictures.colours import ACTORS, DRIVEN, FLEET, LEVELS, PLANN
 from terrain.viewer.pictures.incident_marks import mark_of
 from terrain.viewer.pictures.picture import (
     Extent,
-    draw_line,
     draw_marks,
+    draw_paths,
     draw_scale_bar,
     draw_track,
     draw_triangles,
@@ -53,7 +53,8 @@ LEAST_SIDE = 0.5  # of the longer side of the route's box
 INSET_CELLS = 150  # along the longer side of an inset's world
 EDGE_WIDTH = 0.8  # pixels of the edges of what stands
 DASHES = (0, (3.0, 1.4))
-PLAN_WIDTH = 3.6
+LEGEND_LENGTH = 3.4  # of a line in the legend, in letters: three dashes of a plan
+LEAST_TILT = 1.0  # degrees; on floors there is nothing to say
 INCIDENT_COLOUR = "#b00020"
 
 
@@ -92,18 +93,19 @@ def _drawn(world: Recording, robots: Mapping[str, Recording], driven: str) -> by
     shown = whole if floors else _route_extent(world, whole)
     figure, axes = panel_figure(shown, max(len(floors), 1))
     panels = list(_panels(axes, floors))
+    colours = [FLEET[number % len(FLEET)] if name else DRIVEN for number, name in enumerate(robots)]
     for panel in panels:
         _draw_world(panel, world)
         _draw_actors(panel, world)
-        for number, (name, recording) in enumerate(robots.items()):
-            _draw_robot(panel, name, FLEET[number % len(FLEET)] if name else DRIVEN, recording)
+        for (name, recording), colour in zip(robots.items(), colours, strict=True):
+            _draw_robot(panel, name, colour, recording)
         _draw_incidents(panel, world)
         draw_scale_bar(panel.axes)
         panel.axes.set(xlim=shown[:2], ylim=shown[2:])
         if floors:
             _caption(panel, floors.index(panel.floor))
     if shown != whole:
-        _draw_inset(axes[0], world, robots.values(), whole, shown)
+        _draw_inset(axes[0], world, zip(robots.values(), colours, strict=True), whole, shown)
     _label(axes, world, driven)
     return png_bytes(figure)
 
@@ -190,14 +192,9 @@ def _draw_actors(panel: Panel, recording: Recording) -> None:
 
 def _draw_robot(panel: Panel, name: str, colour: Colour, recording: Recording) -> None:
     """Plans, track, start and goals of a robot; earlier plans faint."""
-    axes, planned = panel.axes, colour if name else PLANNED
-    for _, points in recording.paths[:-1]:
-        x, y, _ = panel.part(points).T
-        axes.plot(x, y, color=np.array(planned) / 255.0, linewidth=1.0, alpha=0.35, zorder=4)
-    for _, points in recording.paths[-1:]:
-        label = f"{name}, its plan" if name else "plan"
-        draw_line(axes, panel.part(points), planned, PLAN_WIDTH, zorder=5, label=label, linestyle=DASHES)
-    label = f"{name}, driven" if name else "driven track"
+    axes, paths = panel.axes, [panel.part(points) for _, points in recording.paths]
+    draw_paths(axes, paths, colour if name else PLANNED, f"{name}: " if name else "", DASHES)
+    label = f"{name}: driven track" if name else "driven track"
     poses = np.concatenate([panel.part(recording.poses[:, :3]), recording.poses[:, 3:]], axis=1)
     draw_track(axes, poses, recording.robot.footprint, colour, label)
     goals = tuple(goal for goal in recording.goals if panel.shows(np.array([goal.position[2]]))[0])
@@ -221,7 +218,9 @@ def _caption(panel: Panel, number: int) -> None:
     panel.axes.text(0.02, 0.97, text, transform=panel.axes.transAxes, va="top", fontsize=9, bbox=back, zorder=12)
 
 
-def _draw_inset(axes: Axes, recording: Recording, robots: Iterable[Recording], whole: Extent, shown: Extent) -> None:
+def _draw_inset(
+    axes: Axes, recording: Recording, robots: Iterable[tuple[Recording, Colour]], whole: Extent, shown: Extent
+) -> None:
     """Beside the picture: all of the world, coarsely, with the frame of what the picture shows and the tracks."""
     inset = axes.inset_axes((1.02, 0.0, 0.3, 0.3))
     inset.set(xlim=whole[:2], ylim=whole[2:], aspect="equal", anchor="SW", xticks=[], yticks=[])
@@ -233,8 +232,8 @@ def _draw_inset(axes: Axes, recording: Recording, robots: Iterable[Recording], w
     edge = EDGE_WIDTH * pixel_size(inset)
     painted += [plain_triangles(surface, colour, edge) for _, surface, colour in standing_things(recording)]
     _paint(inset, painted)
-    for robot in robots:
-        inset.plot(robot.poses[:, 0], robot.poses[:, 1], color=np.array(DRIVEN) / 255.0, linewidth=1.0)
+    for robot, colour in robots:
+        inset.plot(robot.poses[:, 0], robot.poses[:, 1], color=np.array(colour) / 255.0, linewidth=1.0)
     x_min, x_max, y_min, y_max = shown
     x, y = [x_min, x_max, x_max, x_min, x_min], [y_min, y_min, y_max, y_max, y_min]
     inset.plot(x, y, color="#222222", linewidth=1.2)
@@ -250,7 +249,7 @@ def _label(axes: list[Axes], recording: Recording, driven: str) -> None:
     figure, first = axes[0].figure, axes[0]
     title = f"{recording.scenario[:MAX_NAME]} · {recording.backend[:MAX_NAME]} · {recording.verdict.title}"
     tilt = np.degrees(recording.tilt).max(initial=0.0)
-    facts = f"{driven} in {recording.duration:.1f} s, tilt up to {tilt:.0f}°"
+    facts = f"{driven} in {recording.duration:.1f} s" + (f", tilt up to {tilt:.0f}°" if tilt >= LEAST_TILT else "")
     colour = LEVELS[recording.verdict.level]
     first.set_title(f"{title}\n", loc="left", fontsize=12, fontweight="bold", color=colour, parse_math=False)
     above: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
@@ -261,11 +260,11 @@ def _label(axes: list[Axes], recording: Recording, driven: str) -> None:
     for panel in axes:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
             named.setdefault(label, handle)
+    style: dict[str, Any] = {"ncols": 6, "frameon": False, "fontsize": 9, "handlelength": LEGEND_LENGTH}
     if len(axes) > 1:
-        figure.legend(named.values(), named, loc="outside lower center", ncols=6, frameon=False, fontsize=9)
+        figure.legend(named.values(), named, loc="outside lower center", **style)
     else:
-        place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.08)}
-        first.legend(named.values(), named, ncols=6, frameon=False, fontsize=9, **place)
+        first.legend(named.values(), named, loc="upper center", bbox_to_anchor=(0.5, -0.08), **style)
 
 
 def _draw_slope_legend(axes: Axes) -> None:

@@ -98,10 +98,10 @@ def legend_of(recording: Recording, robots: Sequence[tuple[str, Colour]] = ()) -
     ``robots`` are the names and colours of several ones, whose tracks differ.
     """
     if robots:
-        entries = [Entry(f"{name}, its plan", colour, "dash") for name, colour in robots]
-        entries += [Entry(f"{name}, driven", colour, "line") for name, colour in robots]
+        entries = [Entry(f"{name}: plan", colour, "dash") for name, colour in robots]
+        entries += [Entry(f"{name}: driven track", colour, "line") for name, colour in robots]
     else:
-        entries = [Entry("plan", PLANNED, "dash"), Entry("driven", DRIVEN, "line")]
+        entries = [Entry("plan", PLANNED, "dash"), Entry("driven track", DRIVEN, "line")]
     if recording.scans:
         entries.append(Entry("seen by a sensor", SCAN))
     if recording.objects:

@@ -29,7 +29,8 @@ def comparison_html(names: Sequence[str], runs: Sequence[Run]) -> str:
         f"<h2>Metrics</h2><p>{escape(compare_digests(names, metrics))}</p>"
         + table(metrics_header(names), compare_metrics(metrics)),
         "<h2>Over time</h2>" + beside(*(report.plots_svg(run) if len(run.times) else "" for run in recordings)),
-        "<h2>Actions and plugins</h2>" + beside(*(timeline_svg(run.events) for run in recordings)),
+        f"<h2>Actions and plugins</h2><p>{report.TIMELINE_TEXT}</p>"
+        + beside(*(timeline_svg(run.events) for run in recordings)),
         "<h2>Results of the goals, in order</h2>" + beside(*map(report.goals_table, recordings)),
         "<h2>Incidents, faults, stops and recoveries</h2>" + beside(*map(report.notable_table, recordings)),
     ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from html import escape
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from mbf_abstract.whole_files import write_whole
 from terrain.recording.drive_logs import recording_of
 from terrain.viewer.pictures.map_picture import map_png
 from terrain.viewer.pictures.picture import ViewerMissing
-from terrain.viewer.reports.page import page, table
+from terrain.viewer.reports.page import image, page, table
 
 PICTURES = "map_*.png"
 
@@ -50,13 +49,8 @@ def _report_html(log: DriveLog, report: LogReport, pictures: list[tuple[str, byt
     title = f"{log.name} on {log.backend}"
     parts = [f"<h1>{escape(title)}</h1>", f"<p>{escape(report.result)}</p>"]
     parts += [f"<p>{escape(note)}</p>" for note in report.notes]
-    parts += [_image(name, png) for name, png in pictures[-1:]]
+    parts += [f"<p>{image(name, png)}</p>" for name, png in pictures[-1:]]
     parts += [f"<h2>{escape(one.title)}</h2>" + table(one.header, one.rows) for one in report.tables]
     if pictures[:-1]:
-        parts += ["<h2>The map over time</h2>", *(_image(name, png) for name, png in pictures[:-1])]
+        parts += ["<h2>The map over time</h2>", *(f"<p>{image(name, png)}</p>" for name, png in pictures[:-1])]
     return page(title, parts)
-
-
-def _image(name: str, png: bytes) -> str:
-    data = base64.b64encode(png).decode("ascii")
-    return f'<p><img alt="{escape(name)}" src="data:image/png;base64,{data}"></p>'

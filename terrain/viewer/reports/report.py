@@ -6,7 +6,6 @@ motion see ``terrain.viewer.replay``.
 
 from __future__ import annotations
 
-import base64
 import io
 from collections.abc import Iterable, Mapping
 from html import escape
@@ -23,13 +22,18 @@ from terrain.viewer.pictures.layer_picture import has_layers, layer_picture_png
 from terrain.viewer.pictures.picture import ViewerMissing
 from terrain.viewer.pictures.run_picture import picture_png
 from terrain.viewer.reports.event_lines import NOTABLE, event_text
-from terrain.viewer.reports.page import page, table
+from terrain.viewer.reports.page import image, page, table
 from terrain.viewer.reports.timeline import timeline_svg
 
 LAYERS_TEXT = (
     "As the map was when the first plan came: from pale green for 0 to dark red for the end of the layer's own scale, "
     "grey for what it forbids. The line is the last plan."
 )
+
+TIMELINE_TEXT = (
+    "Green succeeded, red failed; grey was canceled or replaced, or is a control loop; point at a bar for more."
+)
+LEAST_TILT_SCALE = 5.0  # degrees; else a hundredth of a degree on a floor looks like a hill
 
 
 def report_html(recording: Recording, metrics: Mapping[str, Any], drawn: bytes | None = None) -> str:
@@ -45,7 +49,7 @@ def report_html(recording: Recording, metrics: Mapping[str, Any], drawn: bytes |
         picture(recording, drawn),
         layers(recording),
         "<h2>Over time</h2>" + plots_svg(recording) if len(recording.times) else "",
-        f"<h2>Actions and plugins</h2>{timeline_svg(recording.events)}",
+        f"<h2>Actions and plugins</h2><p>{TIMELINE_TEXT}</p>{timeline_svg(recording.events)}",
         "<h2>Metrics</h2>" + table(("name", "value"), metrics.items()),
         "<h2>Results of the goals, in order</h2>" + goals_table(recording),
         "<h2>Incidents, faults, stops and recoveries</h2>" + notable_table(recording),
@@ -69,17 +73,15 @@ def summary(recording: Recording) -> str:
 
 def picture(recording: Recording, drawn: bytes | None = None) -> str:
     """The run from above; ``drawn`` as in ``report_html``."""
-    data = base64.b64encode(drawn or picture_png(recording)).decode("ascii")
-    return f'<img alt="map, plan and driven track from above" src="data:image/png;base64,{data}">'
+    return image("map, plan and driven track from above", drawn or picture_png(recording))
 
 
 def layers(recording: Recording) -> str:
     """What each layer of a mesh map said; nothing where that was not recorded."""
     if not has_layers(recording):
         return ""
-    data = base64.b64encode(layer_picture_png(recording)).decode("ascii")
-    image = f'<img alt="costs of each layer from above" src="data:image/png;base64,{data}">'
-    return f"<h2>Costs by layer</h2><p>{LAYERS_TEXT}</p>{image}"
+    drawn = image("costs of each layer from above", layer_picture_png(recording))
+    return f"<h2>Costs by layer</h2><p>{LAYERS_TEXT}</p>{drawn}"
 
 
 def goals_table(recording: Recording) -> str:
@@ -119,6 +121,7 @@ def plots_svg(recording: Recording) -> str:
         panel.spines[["top", "right"]].set_visible(False)
         if len(lines) > 1:
             panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, fontsize=8, frameon=False)
+    axes[2].set_ylim(top=max(axes[2].get_ylim()[1], LEAST_TILT_SCALE))
     axes[-1].set_xlabel("time [s]")
     figure.align_ylabels(axes)
     buffer = io.StringIO()
@@ -129,9 +132,9 @@ def plots_svg(recording: Recording) -> str:
 
 
 def _asked(recording: Recording) -> str:
-    goals = ", then ".join(f"({goal.x:.1f}, {goal.y:.1f})" for goal in recording.goals) or "nowhere"
+    goals = ", then ".join(f"({goal.x:.1f}, {goal.y:.1f}) m" for goal in recording.goals) or "nowhere"
     start = recording.start
-    return f"Asked: robot {recording.robot.name} from ({start.x:.1f}, {start.y:.1f}) to {goals}."
+    return f"Asked: robot {recording.robot.name} from ({start.x:.1f}, {start.y:.1f}) m to {goals}."
 
 
 def _goals(recording: Recording) -> Iterable[tuple[str, ...]]:

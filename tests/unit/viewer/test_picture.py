@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from PIL import Image
 
 from mbf_abstract.events import Event, EventKind
@@ -14,6 +15,7 @@ from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
+from terrain.viewer.pictures import run_picture
 from terrain.viewer.pictures.colours import (
     ACTORS,
     BAD,
@@ -113,6 +115,27 @@ def test_each_storey_has_a_panel_with_its_part_of_plan_and_track(garage_recordin
     assert columns_of(two, GOAL).min() > middle, "the goal is on the roof"
     boxes = [np.abs(two[:, half] - WALL).max(axis=2) <= 6 for half in (slice(0, middle), slice(middle, None))]
     assert boxes[0].sum() > boxes[1].sum() * 1.02, "pillars and parked cars of the ground floor are in its panel only"
+
+
+def texts_of(monkeypatch, recording):
+    """All that is written in a run's picture."""
+    drawn = []
+    monkeypatch.setattr(run_picture, "png_bytes", lambda figure: drawn.extend(figure.findobj(Text)) or b"")
+    run_picture.picture_png(recording)
+    return {text.get_text() for text in drawn}
+
+
+def test_earlier_plans_are_in_the_legend_where_there_are_any(monkeypatch, office_recording):
+    (_, plan) = office_recording.paths[-1]
+    once, twice = (replace(office_recording, paths=[(0.0, plan)] * count) for count in (1, 3))
+
+    assert "earlier plans" not in texts_of(monkeypatch, once)
+    assert {"plan", "earlier plans"} <= texts_of(monkeypatch, twice)
+
+
+def test_the_facts_name_a_tilt_only_where_there_was_one(monkeypatch, office_recording, hill_recording):
+    assert not any("tilt" in text for text in texts_of(monkeypatch, office_recording))
+    assert any("tilt up to" in text for text in texts_of(monkeypatch, hill_recording))
 
 
 def test_all_robots_of_a_run_are_in_its_picture_with_plan_and_track(two_robots):

@@ -230,7 +230,7 @@ def test_all_robots_of_a_run_are_in_its_replay_each_in_its_colour_with_path_and_
     np.testing.assert_array_equal(b - a, np.tile([0, 3000, 0], (len(a), 1)))
     assert all(arrays[robot["plans"]["counts"]].sum() > 50 for robot in scene["robots"])
     assert scene["actors"] == [], "the other robot is drawn once"
-    assert ">a, its plan<" in page and ">b, driven<" in page
+    assert ">a: plan<" in page and ">b: driven track<" in page
 
 
 @pytest.mark.parametrize("text", ["</script><script>alert(1)</script>", "{{arrays}}", "$&"])

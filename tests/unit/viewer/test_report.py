@@ -1,10 +1,13 @@
 """The report says what happened, in one file that needs nothing else."""
 
+import base64
+import io
 import re
 from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
+from PIL import Image
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose
@@ -13,6 +16,7 @@ from terrain.recording.metrics import measure
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
+from terrain.viewer.pictures.run_picture import picture_png
 from terrain.viewer.reports.page import MAX_ROWS
 from terrain.viewer.reports.report import report_html
 from terrain.viewer.reports.timeline import Bar, action_bars, plugin_bars, timeline_svg
@@ -90,3 +94,10 @@ def test_the_timeline_is_sound_svg_for_open_goals_too(office_recording, finished
     assert len([node for node in nodes if node.tag == "rect"]) == 5
     assert "move_base: BLOCKED_PATH, 0.00 s to 15.40 s" in titles or not finished
     assert "3.00 s: velocity_gate: robot_stopped: no command for 0.5 s" in titles
+
+
+def test_the_pictures_of_a_report_are_smaller_than_the_picture_alone(hill_recording):
+    drawn = picture_png(hill_recording)
+    shown = [base64.b64decode(data) for data in re.findall(r"base64,([^\"]+)", report_of(hill_recording))]
+    assert [Image.open(io.BytesIO(data)).size for data in shown] == [Image.open(io.BytesIO(drawn)).size]
+    assert sum(map(len, shown)) < 0.5 * len(drawn)

@@ -2,6 +2,7 @@
 const STORE = id => JSON.parse(document.getElementById(id).textContent);
 const CUT_SHARE = 0.7, CUT_HEIGHT = 2.0;  // above the robot's floor: of a storey's height, at most [m]
 const ALL = 1e9;
+const LEAST_TILT = 1000;  // thousandths of a degree; a robot that never tilts as much has nothing to say about it
 
 class Replay {
   constructor(scene, run, arrays) {
@@ -163,7 +164,8 @@ class Replay {
     if (robot && robot.at) {
       const speed = robot.speeds[this.bodies.frame] / 1000, tilt = robot.tilts[this.bodies.frame] / 1000;
       if (robot.name) text.push(robot.name);
-      text.push(`${speed.toFixed(1)} m/s`, `tilt ${tilt.toFixed(0)}°`);
+      text.push(`${speed.toFixed(1)} m/s`);
+      if (robot.tilted) text.push(`tilt ${tilt.toFixed(0)}°`);
       if (robot.scale > 1.05) text.push(`robot drawn ${robot.scale.toFixed(1)} × its size`);
       if (last) text.push(this.scene.ending);
     }
@@ -180,6 +182,7 @@ async function begin() {
   for (const robot of scene.robots) {
     robot.speeds = arrays[robot.speeds];
     robot.tilts = arrays[robot.tilts];
+    robot.tilted = robot.tilts.some(tilt => tilt >= LEAST_TILT);
   }
   window.replay = new Replay(scene, run, arrays);
 }

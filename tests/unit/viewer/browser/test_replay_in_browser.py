@@ -190,3 +190,27 @@ def test_a_frame_of_three_hundred_thousand_triangles_stays_within_its_budget(chr
     assert far["triangles"] < near["triangles"] / 20, "a coarser level of detail is drawn from afar"
     assert far["drawCalls"] <= near["drawCalls"]
     assert len(page_text) < 2e6
+
+
+def test_no_chip_covers_the_robot_at_its_start(chromium, office_recording, tmp_path):
+    (tmp_path / "replay.html").write_text(replay_html(office_recording), encoding="utf-8")
+    robot = """(() => { const {bodies, camera} = window.replay, robot = bodies.robots[0], [x, y, z] = robot.at;
+        const high = robot.height * robot.scale;
+        return [0.2, 0.5, 0.8, 0.95].map(share => camera.project([x, y, z + share * high])); })()"""
+    chips = """[...document.querySelectorAll('.pin b')].map(chip => chip.getBoundingClientRect())
+        .map(box => [box.left, box.right, box.top, box.bottom])"""
+    canvas = "(box => [box.left, box.top])(document.querySelector('canvas').getBoundingClientRect())"
+
+    async def watch(page):
+        await page.open((tmp_path / "replay.html").as_uri())
+        await page.wait_for(READY)
+        await page.key(" ")  # stands
+        await page.key("Home")
+        await page.wait_for("window.replay.player.time < 0.2 && !window.replay.dirty")
+        return await page.evaluate(robot), await page.evaluate(chips), await page.evaluate(canvas)
+
+    places, boxes, (left, top) = chromium.visit(watch)
+
+    assert len(boxes) == 2, "start and goal"
+    for x, y in places:
+        assert not [box for box in boxes if box[0] < left + x < box[1] and box[2] < top + y < box[3]]
