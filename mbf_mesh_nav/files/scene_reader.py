@@ -1,4 +1,4 @@
-"""The triangles of a scene file (PLY, OBJ, STL, OFF, COLLADA, glTF), through trimesh.
+"""The triangles of a scene file (PLY, OBJ, STL, OFF, COLLADA, glTF), through trimesh; a plain PLY without it.
 
 Nodes of the scene are moved into place. Pictures and materials are not read, and of other files only those that lie
 beside the mesh and hold a glTF's numbers.
@@ -18,6 +18,7 @@ from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.files.collada_check import check_collada
 from mbf_mesh_nav.files.file_frames import GLTF_FORMATS
 from mbf_mesh_nav.files.gltf_check import check_gltf
+from mbf_mesh_nav.files.plain_ply import read_plain_ply
 from mbf_mesh_nav.files.truncated_files import refuse_cut_file
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
@@ -65,6 +66,10 @@ def read_scene(path: Path, part: str, max_faces: int) -> MeshArrays:
 
 
 def _read(path: Path, part: str, max_faces: int) -> MeshArrays:
+    plain = read_plain_ply(path) if path.suffix.lower() == ".ply" and not part else None
+    if plain is not None:
+        _limit(path, len(plain[1]), max_faces)
+        return plain
     scene = _loaded(path, part)
     nodes = [node for node in scene.graph.nodes_geometry if _belongs_to(scene, node, part)]
     if not nodes and scene.graph.nodes_geometry:
@@ -72,8 +77,7 @@ def _read(path: Path, part: str, max_faces: int) -> MeshArrays:
         raise MeshError(str(path), [f"no part '{part}', the parts are: {', '.join(parts)}"])
     meshes = [(node, scene.geometry[scene.graph[node][1]]) for node in nodes]
     meshes = [(node, mesh) for node, mesh in meshes if hasattr(mesh, "faces")]
-    if (count := sum(len(mesh.faces) for _, mesh in meshes)) > max_faces:
-        raise MeshError(str(path), [f"{count} faces, the limit is {max_faces} (max_faces)"])
+    _limit(path, sum(len(mesh.faces) for _, mesh in meshes), max_faces)
     vertices, faces = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)]
     offset = 0
     for node, mesh in meshes:
@@ -83,6 +87,11 @@ def _read(path: Path, part: str, max_faces: int) -> MeshArrays:
         faces.append(corners[:, ::-1] if mirrored else corners)  # mirrored parts are inside out
         offset += len(points)
     return np.vstack(vertices), np.vstack(faces)
+
+
+def _limit(path: Path, count: int, max_faces: int) -> None:
+    if count > max_faces:
+        raise MeshError(str(path), [f"{count} faces, the limit is {max_faces} (max_faces)"])
 
 
 def _placed(scene: Any, node: str, points: FloatArray) -> tuple[FloatArray, bool]:

@@ -7,9 +7,10 @@ inside of a surface never changes, however fine it is.
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_mesh_nav.arrays import FloatArray, IntArray
@@ -45,7 +46,7 @@ def join_boundaries(vertices: FloatArray, face_neighbours: IntArray, faces: IntA
     target = np.arange(len(vertices), dtype=np.int32)
     face, corner = np.nonzero(face_neighbours < 0)
     boundary = np.unique(np.concatenate([faces[face, corner], faces[face, (corner + 1) % 3]]))
-    pairs = cKDTree(vertices[boundary]).query_pairs(distance, output_type="ndarray")
+    pairs = _pairs_within(vertices[boundary], distance)
     if not len(pairs):
         return target
     target[boundary] = boundary[first_of_group(pairs.T, len(boundary))]
@@ -53,6 +54,31 @@ def join_boundaries(vertices: FloatArray, face_neighbours: IntArray, faces: IntA
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     detail = target[start[(target[start] == target[end]) & (start != end)]]
     return np.where(np.isin(target, detail), np.arange(len(target), dtype=np.int32), target)
+
+
+def _pairs_within(points: FloatArray, distance: float) -> NDArray[np.integer]:
+    """Pairs (n, 2) of points (P, 3) that are at most ``distance`` [m] apart."""
+    if not _may_be_near(points, distance):
+        return np.empty((0, 2), dtype=np.intp)
+    from scipy.spatial import cKDTree  # slow to import, and most meshes have no such points
+
+    return np.asarray(cKDTree(points).query_pairs(distance, output_type="ndarray"))
+
+
+def _may_be_near(points: FloatArray, distance: float) -> bool:
+    """Whether any two points (P, 3) may be at most ``distance`` [m] apart; False is certain.
+
+    Two such points share a cell of a grid with cells of four times the distance, or of one moved by half a cell along
+    some axes, as at most one of both grids parts them along an axis.
+    """
+    if not distance > 0.0:
+        return True
+    for shift in product((0.0, 0.5), repeat=3):
+        cells = np.floor(points / (4.0 * distance) + np.array(shift))
+        in_order = cells[np.lexsort(cells.T)]
+        if (in_order[1:] == in_order[:-1]).all(axis=1).any():
+            return True
+    return False
 
 
 def first_of_group(pairs: NDArray[np.integer], count: int) -> IntArray:
