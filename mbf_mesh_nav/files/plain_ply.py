@@ -31,10 +31,12 @@ def read_plain_ply(path: Path) -> tuple[FloatArray, NDArray[np.int64]] | None:
         if types is None:
             return None
         (vertex, vertex_count), (face, face_count) = types
-        size = vertex_count * vertex.itemsize + face_count * face.itemsize
-        if path.stat().st_size != file.tell() + size:
-            return None
-        vertices, faces = (np.frombuffer(file.read(count * kind.itemsize), kind) for kind, count in types)
+        split = vertex_count * vertex.itemsize
+        size = split + face_count * face.itemsize
+        content = file.read(size + 1) if size <= path.stat().st_size else b""
+    if len(content) != size:
+        return None
+    vertices, faces = np.frombuffer(content[:split], vertex), np.frombuffer(content[split:], face)
     if (faces["count"] != 3).any():
         return None
     points = np.column_stack([vertices[axis] for axis in "xyz"]).astype(np.float64)
