@@ -32,9 +32,6 @@ from mbf_costmap_nav.map.static_maps import StaticMaps
 from mbf_costmap_nav.planning.nav_core import wrap_nav_core
 from mbf_costmap_nav.plugins import CostmapContext
 
-Which = Literal["local", "global"]
-"""One of the two maps, as a plugin's declaration names it."""
-
 MAP_SUFFIXES = {".yaml", ".yml", ".pgm", ".png", ".bmp"}
 
 BARE_MAP = """\

@@ -14,17 +14,15 @@ Formula: the gradient smoother of Dolgov et al. 2010 without its Voronoi term, w
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.arithmetic import arctan2
 from mbf_abstract.geometry.polyline import polyline_lengths
-from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.maps.refiners.map_refiner import MapRefiner
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RefineResult
@@ -57,41 +55,25 @@ class SmootherParameters(PluginParameters):
     max_sweeps: int = parameter(1000, "Stop after this many sweeps.", ge=1, le=100000)
 
 
-class SmootherRefiner(CostmapRefiner):
+class SmootherRefiner(CostmapRefiner, MapRefiner):
     """Cost-aware path smoother."""
 
     Parameters: ClassVar[type[PluginParameters]] = SmootherParameters
     parameters: SmootherParameters
 
-    def apply_refinement(self, path: Path, cancel_token: CancelToken) -> RefineResult:
+    def refine(self, path: Path, cancel_token: CancelToken) -> Path | RefineResult:
         """Smooth between the ends of the path."""
-        if len(path) < 2:
-            return RefineResult(RefinePathOutcome.SUCCESS, "nothing to smooth", path)
-        if PathTracker(path, dimensions=2).reverse.any():
-            text = "the path drives backward somewhere and is left as it is"
-            return RefineResult(RefinePathOutcome.SUCCESS, text, path)
         costmap = self.costmap.snapshot()
-        try:
-            T_costmap_path = self.transforms.lookup(costmap.frame_id, path.frame_id)
-        except TransformError as error:
-            return RefineResult(
-                RefinePathOutcome.MAP_ERROR, f"the path cannot be transformed to the costmap's frame: {error}", path
-            )
-        there = T_costmap_path.apply_to_path(path)
-        if not costmap.world_to_cells(there.positions)[1].all():
-            return RefineResult(RefinePathOutcome.MAP_ERROR, f"the path leaves {costmap}", path)
-        points = resample(there.positions[:, :2], self.parameters.spacing)
+        if not costmap.world_to_cells(path.positions)[1].all():
+            return RefineResult(RefinePathOutcome.MAP_ERROR, f"the path leaves {costmap}")
+        points = resample(path.positions[:, :2], self.parameters.spacing)
         smoothed = self._drivable(costmap, points, cancel_token)
         if isinstance(smoothed, RefineResult):
-            return replace(smoothed, path=path)
-        lengths, old_lengths = polyline_lengths(points), polyline_lengths(there.positions[:, :2])
-        heights = np.interp(lengths, old_lengths, there.positions[:, 2])
+            return smoothed
+        lengths, old_lengths = polyline_lengths(points), polyline_lengths(path.positions[:, :2])
+        heights = np.interp(lengths, old_lengths, path.positions[:, 2])
         flat = Path.from_points(np.column_stack([smoothed, np.zeros(len(smoothed))]))
-        positions = np.column_stack([smoothed, heights])
-        refined = T_costmap_path.inverse().apply_to_path(
-            Path(positions, flat.orientations, costmap.frame_id, path.stamp)
-        )
-        return RefineResult(RefinePathOutcome.SUCCESS, "", _with_ends_of(path, refined))
+        return _with_ends_of(path, np.column_stack([smoothed, heights]), flat.orientations)
 
     def _drivable(self, costmap: Costmap, points: FloatArray, token: CancelToken) -> FloatArray | RefineResult:
         """Smoothed points (n, 2) [m] below the largest curvature and off lethal cells, or the reason of a failure."""
@@ -99,10 +81,8 @@ class SmootherRefiner(CostmapRefiner):
         data_weight = p.data_weight
         for _ in range(ATTEMPTS):
             smoothed = self._smooth(costmap, points, data_weight, token)
-            if token.cancelled:
-                return RefineResult(RefinePathOutcome.CANCELED, token.reason)
             curvature = curvatures(smoothed)
-            if p.max_curvature == 0.0 or curvature.max() <= p.max_curvature:
+            if token.cancelled or p.max_curvature == 0.0 or curvature.max() <= p.max_curvature:
                 break
             data_weight *= SOFTER
         else:
@@ -132,11 +112,11 @@ class SmootherRefiner(CostmapRefiner):
         return np.asarray(cells * costmap.resolution + origin)
 
 
-def _with_ends_of(path: Path, refined: Path) -> Path:
-    """Give a refined path exactly the first and the last pose of the given one."""
-    assert path.orientations is not None and refined.orientations is not None
-    positions, orientations = refined.positions.copy(), refined.orientations.copy()
-    positions[[0, -1]], orientations[[0, -1]] = path.positions[[0, -1]], path.orientations[[0, -1]]
+def _with_ends_of(path: Path, positions: FloatArray, orientations: FloatArray | None) -> Path:
+    """Path of these poses, with exactly the first and the last one of the given path."""
+    assert path.orientations is not None and orientations is not None
+    positions[[0, -1]], orientations = path.positions[[0, -1]], orientations.copy()
+    orientations[[0, -1]] = path.orientations[[0, -1]]
     return Path(positions, orientations, path.frame_id, path.stamp)
 
 

@@ -15,15 +15,13 @@ that makes it shorter (Xin and Wang 2007), see ``kernels.wave.corridors``.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
-from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.polyline import polyline_lengths
-from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.maps.refiners.map_refiner import MapRefiner
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RefineResult
@@ -54,37 +52,20 @@ class StringPullingParameters(PluginParameters):
     )
 
 
-class StringPullingRefiner(MeshRefiner):
+class StringPullingRefiner(MeshRefiner, MapRefiner):
     """Cost-aware shortening of a path over the surface."""
 
     Parameters: ClassVar[type[PluginParameters]] = StringPullingParameters
     parameters: StringPullingParameters
 
-    def apply_refinement(self, path: Path, cancel_token: CancelToken) -> RefineResult:
+    def refine(self, path: Path, cancel_token: CancelToken) -> Path | RefineResult:
         """Pull the path straight between its ends."""
-        if len(path) < 2:
-            return RefineResult(RefinePathOutcome.SUCCESS, "nothing to shorten", path)
-        if PathTracker(path).reverse.any():
-            text = "the path drives backward somewhere and is left as it is"
-            return RefineResult(RefinePathOutcome.SUCCESS, text, path)
-        # 1. The path in the frame of the mesh, as points in faces.
-        try:
-            there = self.transforms.transform_path(path, self.mesh_map.frame_id)
-        except TransformError as error:
-            text = f"the path cannot be transformed to the mesh's frame: {error}"
-            return RefineResult(RefinePathOutcome.MAP_ERROR, text, path)
         snapshot = self.mesh_map.snapshot()
         corridor = Corridor(self.mesh_map, snapshot, snapshot.blocked(self.parameters.cost_limit))
-        piece = self._on_surface(corridor, there.positions)
+        piece = self._on_surface(corridor, path.positions)
         if isinstance(piece, RefineResult):
-            return replace(piece, path=path)
-        # 2. Shorter pieces, pass by pass.
-        pulled = self._pulled(corridor, piece, cancel_token)
-        if cancel_token.cancelled:
-            return RefineResult(RefinePathOutcome.CANCELED, cancel_token.reason, path)
-        # 3. Poses on the surface, in the frame and with the ends of the path.
-        refined = self.transforms.transform_path(self._with_poses(there, pulled), path.frame_id)
-        return RefineResult(RefinePathOutcome.SUCCESS, "", refined)
+            return piece
+        return self._with_poses(path, self._pulled(corridor, piece, cancel_token))
 
     def _on_surface(self, corridor: Corridor, positions: FloatArray) -> Piece | RefineResult:
         """The path as points and the faces its segments lie in, or what is off the surface."""

@@ -1,0 +1,1 @@
+"""What refiners of every map have in common."""
