@@ -25,7 +25,7 @@ from mbf_abstract.session import NavigationSession
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.time.clock import WallClock, unix_seconds, wall_seconds
 from mbf_ros.messages.geometry import MessageContext, odometry_message, pose_stamped, transforms_message
-from mbf_ros.messages.interfaces import json_text
+from mbf_ros.messages.json_text import json_text
 from mbf_ros.messages.maps import occupancy_cells
 from mbf_ros.messages.sensors import laser_scan_of
 

@@ -21,7 +21,8 @@ from mbf_ros.map_messages import Audience, GridMessages
 from mbf_ros.messages import maps
 from mbf_ros.messages.cdr import serialized
 from mbf_ros.messages.geometry import MessageContext
-from mbf_ros.messages.interfaces import Message, completed, json_text
+from mbf_ros.messages.interfaces import Message, completed
+from mbf_ros.messages.json_text import json_text
 
 SIDE, ROUNDS = 1000, 20
 GRID, UPDATES = "global_costmap/costmap", "global_costmap/costmap_updates"

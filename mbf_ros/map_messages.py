@@ -17,7 +17,7 @@ from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_ros.messages import maps
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.messages.nav2_queries import map_frame
+from mbf_ros.messages.nav2.queries import map_frame
 from mbf_ros.robot_inputs import Quality
 
 MESH_ID = "mbf"

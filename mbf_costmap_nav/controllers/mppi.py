@@ -148,26 +148,22 @@ class MPPIController(PathFollower):
         cycle = self.begin_cycle(request)
         if isinstance(cycle, ControlResult):
             return cycle
-        for attempt in range(2):
+        controls = self._optimise(cycle)
+        if controls is None:  # start over from standing still: the old sequence may be what collides
+            self._nominal[:] = 0.0
             controls = self._optimise(cycle)
-            if controls is not None and self._is_stuck(controls):
-                left = cycle.tracker.remaining
-                text = f"no feasible motion of the car makes progress, {left:.2f} m before the end of its path"
-                return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
-            if controls is not None:
-                command = controls[:, 0].copy()
-                self._nominal = np.column_stack([controls[:, 1:], controls[:, -1]])
-                return ControlResult(ExePathOutcome.SUCCESS, "", self._command(command), self._hindered_by)
-            if attempt == 0:
-                self._nominal[:] = 0.0  # start over from standing still: the old sequence may be what collides
-        text = f"none of {self.parameters.batch_size} sampled trajectories is free of collision"
-        return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
+        if controls is None:
+            text = f"none of {self.parameters.batch_size} sampled trajectories is free of collision"
+            return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
+        if self._is_stuck(controls):
+            left = cycle.tracker.remaining
+            text = f"no feasible motion of the car makes progress, {left:.2f} m before the end of its path"
+            return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
+        self._nominal = np.column_stack([controls[:, 1:], controls[:, -1]])
+        return ControlResult(ExePathOutcome.SUCCESS, "", self._command(controls[:, 0]), self._hindered_by)
 
     def _is_stuck(self, controls: Float32Array) -> bool:
-        """Whether a car that drives ``controls`` has made no progress for a while; it cannot turn on the spot.
-
-        One that lets somebody by is not stuck.
-        """
+        """Whether a car that drives ``controls`` has got nowhere for a while, without letting somebody by."""
         idle = self._radius > 0.0 and abs(controls[0, 0]) < STANDSTILL and not self._hindered_by
         self._idle_cycles = self._idle_cycles + 1 if idle else 0
         return self._idle_cycles > IDLE_CYCLES
@@ -179,10 +175,8 @@ class MPPIController(PathFollower):
     # -------------------------------------------------------------------------------------------- optimisation
     def _optimise(self, cycle: ControlCycle) -> Float32Array | None:
         """Best velocities (3, steps) around the nominal ones, or None if nothing fits."""
-        p = self.parameters
-        noise = self._noise[int(self.rng.integers(NOISE_POOL))]
-        velocities = self._velocities
-        add_noise(self._nominal, noise, self._deviation, velocities)
+        p, velocities = self.parameters, self._velocities
+        add_noise(self._nominal, self._noise[int(self.rng.integers(NOISE_POOL))], self._deviation, velocities)
         self._clip(cycle, velocities)
         reach = p.max_vel_x * p.model_dt * p.time_steps
         rollouts = roll_out(cycle, velocities, p.model_dt, reach, self._poses, self._radius)

@@ -56,7 +56,8 @@ def replay(
         from mbf_abstract.drive_log import write_drive_log
         from mbf_abstract.server.factory import read_config
         from mbf_ros.bags.reading import open_bag
-        from mbf_ros.bags.replay import ReplayOptions, replay_bag
+        from mbf_ros.bags.replay import replay_bag
+        from mbf_ros.bags.replay_options import ReplayOptions
         from mbf_ros.bags.report import report_of, result_line, statistics_of
 
         options = ReplayOptions(_pairs(topic), _transforms(tf), odom_tf, map_name, place, at, planner, every)

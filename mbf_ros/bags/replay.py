@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
-from mbf_abstract.commands.coordinates import Place
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.drive_log import DriveLog
 from mbf_abstract.events import Event, EventKind
-from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.map_server import MapServer
@@ -26,7 +24,8 @@ from mbf_ros.bags.inputs import BagInputs, RecordedRobot
 from mbf_ros.bags.observation import Observation
 from mbf_ros.bags.planning import ReplayedPlan
 from mbf_ros.bags.reading import Bag, BagError
-from mbf_ros.bags.recorded_time import RecordedTime, check_seconds, steady_messages
+from mbf_ros.bags.recorded_time import RecordedTime, steady_messages
+from mbf_ros.bags.replay_options import ReplayOptions
 from mbf_ros.bags.statistics import FrameStatistics, TopicStatistics
 from mbf_ros.bags.topics import BagTopics, choose_topics
 from mbf_ros.messages.geometry import MessageContext
@@ -35,49 +34,6 @@ from mbf_ros.robot_inputs import RobotInputs
 SAMPLE_PERIOD = 0.1  # s
 PICTURES = 10  # of the map, where the user asks for none
 MOST_PICTURES = 200
-
-
-@dataclass(frozen=True)
-class ReplayOptions:
-    """How a bag is replayed.
-
-    Attributes
-    ----------
-    topics : mapping of str to str
-        Topics by what they are, where there is a choice, see ``choose_topics``.
-    transforms : tuple of Transform
-        Static ones that the bag lacks.
-    odometry_as_transform : bool
-        Take the poses of odometry for transforms.
-    map_name : str
-        Which map is shown; the one that plans are made on if empty.
-    goal : Place, optional
-        Where to plan to.
-    at : float
-        When to plan [s from the beginning of the bag]; at its end if infinite.
-    planner : str
-        Name; the first one if empty.
-    every : float
-        Time between two pictures of the map [s]; 0 makes ten pictures.
-
-    Raises
-    ------
-    ValueError
-        ``at`` or ``every`` are negative or NaN.
-    """
-
-    topics: Mapping[str, str] = field(default_factory=dict)
-    transforms: tuple[Transform, ...] = ()
-    odometry_as_transform: bool = False
-    map_name: str = ""
-    goal: Place | None = None
-    at: float = math.inf
-    planner: str = ""
-    every: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("at", "every"):
-            check_seconds(f"--{name}", getattr(self, name))
 
 
 @dataclass(frozen=True)

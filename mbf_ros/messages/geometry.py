@@ -64,9 +64,9 @@ class MessageContext:
 
 def duration(seconds: float) -> Message:
     """Return a builtin_interfaces/Duration, of 0 where the number [s] is not finite or has no place in one."""
-    limit = 2**31 - 1
-    whole = math.floor(seconds) if math.isfinite(seconds) and abs(seconds) < limit else 0
-    nanoseconds = round((seconds - whole) * NANOSECONDS) if math.isfinite(seconds) and abs(seconds) < limit else 0
+    known = seconds if abs(seconds) < 2**31 - 1 else 0.0
+    whole = math.floor(known)
+    nanoseconds = round((known - whole) * NANOSECONDS)
     return {"sec": whole + nanoseconds // NANOSECONDS, "nanosec": nanoseconds % NANOSECONDS}
 
 
@@ -117,12 +117,11 @@ def pose_of(message: Mapping[str, Any], context: MessageContext, where: str = "p
         A number is not finite, or the quaternion is no rotation.
     """
     header, body = message["header"], message["pose"]
-    rotation = quaternion_of(body["orientation"])
-    if not any(rotation):
+    place = vector_of(body["position"]), quaternion_of(body["orientation"])
+    if not any(place[1]):
         raise InvalidValueError(f"{where}: the quaternion (0, 0, 0, 0) is not a rotation; without a turn w is 1")
     try:
-        frame, stamp = context.frame(header["frame_id"]), context.stamp(header["stamp"])
-        return Pose(vector_of(body["position"]), rotation, frame, stamp)
+        return Pose(*place, context.frame(header["frame_id"]), context.stamp(header["stamp"]))
     except ValueError as error:
         raise InvalidValueError(f"{where}: {error}") from error
 
@@ -134,8 +133,7 @@ def initial_pose_of(message: Mapping[str, Any], context: MessageContext) -> Pose
 
 def initial_pose_message(value: Pose, stamp: float, context: MessageContext) -> Message:
     """Return a PoseWithCovarianceStamped of what somebody has said at ``stamp`` [s]."""
-    covariance = np.zeros(36)
-    covariance[[0, 7, 35]] = SAID_POSITION**2, SAID_POSITION**2, SAID_YAW**2
+    covariance = np.diag([SAID_POSITION**2, SAID_POSITION**2, 0.0, 0.0, 0.0, SAID_YAW**2]).ravel()
     return {"header": context.header(value.frame_id, stamp), "pose": {"pose": pose(value), "covariance": covariance}}
 
 
@@ -219,16 +217,15 @@ def odometry_of(message: Mapping[str, Any], context: MessageContext, received: f
 
 def transforms_message(transforms: Iterable[Transform], context: MessageContext) -> Message:
     """Return a tf2_msgs/TFMessage."""
-    return {
-        "transforms": [
-            {
-                "header": context.header(one.parent, one.stamp),
-                "child_frame_id": one.child,
-                "transform": {"translation": vector(one.translation), "rotation": quaternion(one.rotation)},
-            }
-            for one in transforms
-        ]
-    }
+    stamped = [
+        {
+            "header": context.header(one.parent, one.stamp),
+            "child_frame_id": one.child,
+            "transform": {"translation": vector(one.translation), "rotation": quaternion(one.rotation)},
+        }
+        for one in transforms
+    ]
+    return {"transforms": stamped}
 
 
 def transforms_of(
@@ -244,11 +241,10 @@ def transforms_of(
     found = []
     for one in message["transforms"]:
         body, header = one["transform"], one["header"]
-        names = header["frame_id"].lstrip("/"), one["child_frame_id"].lstrip("/")
-        stamp = context.stamp(header["stamp"]) or received
+        frames = header["frame_id"].lstrip("/"), one["child_frame_id"].lstrip("/")
+        place = vector_of(body["translation"]), quaternion_of(body["rotation"])
         try:
-            translation, rotation = vector_of(body["translation"]), quaternion_of(body["rotation"])
-            found.append(Transform(translation, rotation, *names, stamp, static))
+            found.append(Transform(*place, *frames, context.stamp(header["stamp"]) or received, static))
         except TransformError as error:
             raise InvalidValueError(str(error)) from error
     return found

@@ -21,11 +21,12 @@ from mbf_abstract.goals.result_types import FollowWaypointsResult, MoveBaseResul
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.time.clock import Clock
-from mbf_ros.messages import nav2_actions, nav2_waypoints
 from mbf_ros.messages.action_mapping import ActionMapping
 from mbf_ros.messages.geometry import duration, pose_stamped
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.messages.nav2_behaviors import BEHAVIORS, behavior_mappings
+from mbf_ros.messages.nav2 import actions as nav2_actions
+from mbf_ros.messages.nav2 import waypoints as nav2_waypoints
+from mbf_ros.messages.nav2.behaviors import BEHAVIORS, behavior_mappings
 from mbf_ros.ros2.actions import More, Outcomes, ServedAction, Serving
 from mbf_ros.ros2.conversion import fill
 from mbf_ros.ros2.running import RosError

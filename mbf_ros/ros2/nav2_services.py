@@ -8,7 +8,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_ros.messages.geometry import NO_COVARIANCE, pose_stamped
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.messages.nav2_queries import NAV2_QUESTIONS
+from mbf_ros.messages.nav2.queries import NAV2_QUESTIONS
 from mbf_ros.ros2.actions import Serving
 from mbf_ros.ros2.conversion import fill, interface_class
 from mbf_ros.ros2.services import ServedQueries

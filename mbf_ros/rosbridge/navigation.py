@@ -9,11 +9,14 @@ from typing import Any
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.navigator import Navigator
 from mbf_ros.map_messages import Output
-from mbf_ros.messages import mbf_actions, nav2_actions, nav2_waypoints
+from mbf_ros.messages import mbf_actions
 from mbf_ros.messages.action_mapping import ActionMapping
 from mbf_ros.messages.geometry import MessageContext
-from mbf_ros.messages.interfaces import Message, json_text
+from mbf_ros.messages.interfaces import Message
+from mbf_ros.messages.json_text import json_text
 from mbf_ros.messages.mbf_queries import MAP_QUESTIONS, MapQuestion
+from mbf_ros.messages.nav2 import actions as nav2_actions
+from mbf_ros.messages.nav2 import waypoints as nav2_waypoints
 from mbf_ros.robot_inputs import RobotInputs
 from mbf_ros.rosbridge.actions import ServedAction
 from mbf_ros.rosbridge.bridge import Bridge

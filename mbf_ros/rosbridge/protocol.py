@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from mbf_ros.messages.interfaces import json_text
+from mbf_ros.messages.json_text import json_text
 
 Operation = Mapping[str, Any]
 """What a client has sent, by the names of the fields."""

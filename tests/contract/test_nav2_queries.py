@@ -15,7 +15,7 @@ from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.map.pose_checks import pose_check
 from mbf_ros.messages.geometry import MessageContext, path_message
 from mbf_ros.messages.interfaces import MessageError
-from mbf_ros.messages.nav2_queries import NAV2_QUESTIONS, NOT_VALID, is_path_valid
+from mbf_ros.messages.nav2.queries import NAV2_QUESTIONS, NOT_VALID, is_path_valid
 
 CONTEXT = MessageContext()
 WALL = Box(4.0, 3.0, 4.4, 5.0)

@@ -19,7 +19,7 @@ import pytest
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.time.clock import WallClock
-from mbf_ros.messages.nav2_behaviors import BEHAVIORS
+from mbf_ros.messages.nav2.behaviors import BEHAVIORS
 from mbf_ros.ros2 import nav2
 from mbf_ros.rosbridge.navigation import ACTIONS, NODE
 

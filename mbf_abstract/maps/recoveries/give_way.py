@@ -28,20 +28,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import groupby
 from typing import ClassVar
 
 import numpy as np
 
 from mbf_abstract.drive.robot import RobotStateError
-from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
-from mbf_abstract.geometry.arcs import arc_to
+from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm
-from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
-from mbf_abstract.maps.manoeuvres import PlanarPose, Step
+from mbf_abstract.maps.manoeuvres import Step
 from mbf_abstract.maps.pull_out import find_pull_out, paths_beside, paths_to_keep_free
+from mbf_abstract.maps.recoveries.manoeuvre_recovery import ManoeuvreParameters, ManoeuvreRecovery
 from mbf_abstract.maps.recoveries.wait import stand
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import RecoveryOutcome
@@ -50,18 +46,16 @@ from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.right_of_way import MEETING_LENGTH, right_of_way
 
-LOOKAHEAD = 0.25  # m to the point of the manoeuvre that is steered to
 ATTEMPTS, PAUSE = 4, 2.0  # to drive to a place; s between two of them
 WAIT_PERIOD = 0.5  # s between two looks at where the other robots are
 MOVED = 0.2  # m, of another robot that does not stand
 AHEAD = 2.0  # m of its path ahead that must be clear of others before it ends its wait early
 MOST_WAITS = 3.0  # times longest_wait, for robots that move again and again
-END_REACHED, HEADING_REACHED = 0.04, 0.05  # m, rad
 NOT_THERE = frozenset([RecoveryOutcome.IMPASSABLE, RecoveryOutcome.PAT_EXCEEDED])
 """How it ends to find no place, or not to get there."""
 
 
-class GiveWayParameters(GuardedMotionParameters):
+class GiveWayParameters(ManoeuvreParameters):
     """Parameters of ``give_way``."""
 
     distance: float = parameter(
@@ -73,8 +67,6 @@ class GiveWayParameters(GuardedMotionParameters):
         le=5.0,
     )
     reach: float = parameter(4.0, "Longest manoeuvre to such a place.", unit="m", gt=0.0, le=20.0)
-    speed: float = parameter(0.3, "How fast, forward and backward.", unit="m/s", gt=0.0, le=2.0)
-    yaw_rate: float = parameter(0.8, "Yaw rate limit.", unit="rad/s", gt=0.0, le=3.0)
     wait: float = parameter(3.0, "How long to stand there, at least.", unit="s", ge=0.0, le=600.0)
     random_extra: float = parameter(3.0, "Stand up to this much longer, by chance.", unit="s", ge=0.0, le=600.0)
     longest_wait: float = parameter(
@@ -87,7 +79,7 @@ class GiveWayParameters(GuardedMotionParameters):
     )
 
 
-class GiveWayRecovery(GuardedRecovery):
+class GiveWayRecovery(ManoeuvreRecovery):
     """Pulls out, and waits until the other one may have passed."""
 
     Parameters: ClassVar[type[PluginParameters]] = GiveWayParameters
@@ -142,7 +134,7 @@ class GiveWayRecovery(GuardedRecovery):
                 text = f"no place {p.distance:g} m beside its path within a manoeuvre of {p.reach:g} m"
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
             self.traffic.set_cannot_yield(False)
-            result = self._drive_along(begin, steps, request)
+            result = self.drive_along(begin, steps, request)
             if result.outcome != RecoveryOutcome.IMPASSABLE:
                 break
         return result
@@ -181,18 +173,6 @@ class GiveWayRecovery(GuardedRecovery):
             and float(norm(path[:, :2] - (one.x, one.y)).min()) < near
             for one in known
         )
-
-    def _drive_along(self, begin: Pose, steps: list[Step], request: RecoveryRequest) -> RecoveryResult:
-        frame = Transform(begin.position, begin.orientation, begin.frame_id, "begin")
-        at: PlanarPose = (0.0, 0.0, 0.0)
-        for gear, section in groupby(steps, key=lambda step: step.gear):
-            planned = [at, *(pose for step in section for pose in step.poses)]
-            poses = [frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id="begin")) for x, y, yaw in planned]
-            result = self._turn(request, poses[-1]) if gear == 0 else self._follow(request, poses, gear)
-            if not result.success:
-                return result
-            at = planned[-1]
-        return RecoveryResult(RecoveryOutcome.SUCCESS)
 
     # --------------------------------------------------------------------------------------------- the other robots
     def _rivals(self) -> tuple[Announcement, ...]:
@@ -262,33 +242,3 @@ class GiveWayRecovery(GuardedRecovery):
             if steps is not None or token.cancelled:
                 return steps
         return None
-
-    # --------------------------------------------------------------------------------------------------- the drive
-    def _follow(self, request: RecoveryRequest, poses: list[Pose], gear: int) -> RecoveryResult:
-        """Drive along poses in one gear, by pure pursuit; the last one is prolonged for the point steered to."""
-        last = np.asarray(poses[-1].position) + poses[-1].rotation[:, 0] * (gear * LOOKAHEAD)
-        points = np.array([*(pose.position for pose in poses), last])
-        tracker = PathTracker(Path.from_points(points, frame_id=poses[0].frame_id))
-        speed, limit = gear * self.parameters.speed, self.parameters.yaw_rate
-
-        def finished(pose: Pose) -> bool:
-            tracker.update(pose.position)
-            return tracker.remaining <= LOOKAHEAD + END_REACHED
-
-        def velocity(pose: Pose) -> Twist:
-            _, curvature = arc_to(pose, tracker.point_at(tracker.progress + LOOKAHEAD))
-            return Twist.planar(vx=speed, wz=max(-limit, min(limit, speed * curvature)))
-
-        return self.drive(request, velocity, finished)
-
-    def _turn(self, request: RecoveryRequest, end: Pose) -> RecoveryResult:
-        """Turn on the spot to a heading."""
-
-        def left(pose: Pose) -> float:
-            return normalize_angle(end.yaw - pose.yaw)
-
-        def velocity(pose: Pose) -> Twist:
-            limit = self.parameters.yaw_rate
-            return Twist.planar(wz=max(-limit, min(limit, 2.0 * left(pose))))
-
-        return self.drive(request, velocity, lambda pose: abs(left(pose)) <= HEADING_REACHED)

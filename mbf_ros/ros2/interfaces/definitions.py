@@ -15,9 +15,9 @@ from importlib.resources import files
 
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
-from mbf_ros.messages import nav2_codes
 from mbf_ros.messages.interfaces import Field, fields_of, known_types, types_in
 from mbf_ros.messages.mbf_queries import GLOBAL_COSTMAP, LOCAL_COSTMAP
+from mbf_ros.messages.nav2 import codes as nav2_codes
 
 KILTED, JAZZY = "kilted", "jazzy"
 """Distributions whose packages are known."""

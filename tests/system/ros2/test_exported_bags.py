@@ -9,7 +9,7 @@ import pytest
 from mbf_ros.bags.export import messages_of
 from mbf_ros.bags.reading import open_bag
 from mbf_ros.bags.writing import write_bag
-from mbf_ros.messages.interfaces import json_text
+from mbf_ros.messages.json_text import json_text
 from tests.system.ros2.conftest import PEERS, WITHIN
 from tests.system.ros2.environments import clean_variables
 from tests.unit.bags.test_export import make_log

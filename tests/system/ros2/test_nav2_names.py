@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
-from mbf_ros.messages import nav2_codes as codes
+from mbf_ros.messages.nav2 import codes
 from tests.system.ros2.conftest import Trio
 
 pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900, func_only=True)]

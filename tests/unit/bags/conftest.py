@@ -7,7 +7,8 @@ import pytest
 
 from mbf_abstract.server.factory import read_config
 from mbf_ros.bags.reading import open_bag
-from mbf_ros.bags.replay import ReplayOptions, replay_bag
+from mbf_ros.bags.replay import replay_bag
+from mbf_ros.bags.replay_options import ReplayOptions
 from mbf_ros.bags.writing import BagMessage, message_object, write_bag
 
 BEGAN = 1_700_000_000_250_000_000  # ns

@@ -12,7 +12,8 @@ from mbf_abstract.geometry import Twist
 from mbf_abstract.geometry.transform import Transform
 from mbf_ros.messages import geometry
 from mbf_ros.messages.geometry import InvalidValueError, MessageContext
-from mbf_ros.messages.interfaces import completed, json_text
+from mbf_ros.messages.interfaces import completed
+from mbf_ros.messages.json_text import json_text
 
 CONTEXT = MessageContext("map", 1_700_000_000.0)
 

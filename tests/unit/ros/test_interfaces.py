@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from mbf_ros.messages.interfaces import MessageError, completed, fields_of, json_text, known_types
+from mbf_ros.messages.interfaces import MessageError, completed, fields_of, known_types
+from mbf_ros.messages.json_text import json_text
 
 COMPILED = dict(
     line.split()

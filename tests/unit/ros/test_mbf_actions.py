@@ -17,7 +17,8 @@ from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_ros.messages import mbf_actions as mbf
 from mbf_ros.messages.action_mapping import RefusedGoal
 from mbf_ros.messages.geometry import MessageContext, path_message, path_of, pose_of, pose_stamped, twist_of
-from mbf_ros.messages.interfaces import completed, fields_of, json_text
+from mbf_ros.messages.interfaces import completed, fields_of
+from mbf_ros.messages.json_text import json_text
 
 CONTEXT = MessageContext("map", epoch=1_700_000_000.0)
 

@@ -15,12 +15,11 @@ from mbf_abstract.goals.result_types import (
     RefinePathResult,
 )
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome, RefinePathOutcome
-from mbf_ros.messages import nav2_actions as nav2
-from mbf_ros.messages import nav2_codes as codes
-from mbf_ros.messages import nav2_waypoints as waypoints
 from mbf_ros.messages.action_mapping import RefusedGoal
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import MessageError, completed, fields_of
+from mbf_ros.messages.nav2 import actions as nav2
+from mbf_ros.messages.nav2 import codes, waypoints
 
 CONTEXT = MessageContext()
 PATH = Path([[0, 0, 0], [1, 0, 0]])

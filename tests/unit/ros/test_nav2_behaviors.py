@@ -17,8 +17,8 @@ from mbf_abstract.server.plugin_table import PluginTable
 from mbf_ros.messages.action_mapping import RefusedGoal
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import completed, fields_of, known_types
-from mbf_ros.messages.nav2_behaviors import BEHAVIORS, behavior_mappings
-from mbf_ros.messages.nav2_queries import NAV2_QUESTIONS
+from mbf_ros.messages.nav2.behaviors import BEHAVIORS, behavior_mappings
+from mbf_ros.messages.nav2.queries import NAV2_QUESTIONS
 
 CONTEXT = MessageContext()
 GOALS = {

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_ros.messages.geometry import InvalidValueError, MessageContext
-from mbf_ros.messages.interfaces import completed, json_text
+from mbf_ros.messages.interfaces import completed
+from mbf_ros.messages.json_text import json_text
 from mbf_ros.messages.sensors import laser_scan, laser_scan_of, point_cloud, point_cloud_of, range_of
 
 CONTEXT = MessageContext("map", 100.0)

@@ -9,8 +9,9 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.feedback_types import FollowWaypointsFeedback
 from mbf_abstract.goals.goal_types import FollowWaypointsGoal
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
-from mbf_ros.messages import mbf_actions, nav2_waypoints
+from mbf_ros.messages import mbf_actions
 from mbf_ros.messages.geometry import MessageContext
+from mbf_ros.messages.nav2 import waypoints as nav2_waypoints
 from mbf_ros.ros2 import actions
 from mbf_ros.ros2.actions import MAX_GOALS, ServedAction, Serving
 from mbf_ros.ros2.nav2 import WaypointsAction

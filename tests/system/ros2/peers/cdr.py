@@ -5,7 +5,7 @@ import sys
 
 from rclpy.serialization import deserialize_message
 
-from mbf_ros.messages.interfaces import json_text
+from mbf_ros.messages.json_text import json_text
 from mbf_ros.ros2.conversion import interface_class, to_dict
 
 for line in sys.stdin:

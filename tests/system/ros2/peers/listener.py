@@ -7,7 +7,7 @@ import threading
 import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from mbf_ros.messages.interfaces import json_text
+from mbf_ros.messages.json_text import json_text
 from mbf_ros.ros2.conversion import interface_class, to_dict
 
 rclpy.init()

@@ -13,11 +13,11 @@ from mbf_abstract.goals.feedback_types import FollowWaypointsFeedback, MoveBaseF
 from mbf_abstract.goals.goal_types import FollowWaypointsGoal, MoveBaseGoal
 from mbf_abstract.goals.result_types import FollowWaypointsResult, MoveBaseResult
 from mbf_abstract.outcomes import GetPathOutcome, MoveBaseOutcome
-from mbf_ros.messages import nav2_codes as codes
 from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal
 from mbf_ros.messages.geometry import MessageContext, pose_stamped
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.messages.nav2_actions import GoalsMapping, error_msg, navigate_feedback, poses_or_refuse, unsupported
+from mbf_ros.messages.nav2 import codes
+from mbf_ros.messages.nav2.actions import GoalsMapping, error_msg, navigate_feedback, poses_or_refuse, unsupported
 
 
 def _waypoints_goal_of(message: Message, context: MessageContext) -> FollowWaypointsGoal:

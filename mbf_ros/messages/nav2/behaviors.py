@@ -22,11 +22,11 @@ from mbf_abstract.maps.recoveries.wait import WaitRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import AbstractRecovery, PluginKind
 from mbf_abstract.server.plugin_table import PluginTable
-from mbf_ros.messages import nav2_codes as codes
 from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal
 from mbf_ros.messages.geometry import MessageContext, duration, seconds_of
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.messages.nav2_actions import error_msg, unsupported
+from mbf_ros.messages.nav2 import codes
+from mbf_ros.messages.nav2.actions import error_msg, unsupported
 
 Numbers = dict[str, float]
 

@@ -1,0 +1,75 @@
+"""A recovery that drives a manoeuvre of ``maps.manoeuvres``: sections of one gear each, and turns on the spot."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+import numpy as np
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
+from mbf_abstract.geometry.arcs import arc_to
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
+from mbf_abstract.maps.manoeuvres import PlanarPose, Step
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.parameters import parameter
+from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+
+LOOKAHEAD = 0.25  # m to the point of the manoeuvre that is steered to
+END_REACHED, HEADING_REACHED = 0.04, 0.05  # m, rad
+
+
+class ManoeuvreParameters(GuardedMotionParameters):
+    """Parameters of a recovery that drives a manoeuvre."""
+
+    speed: float = parameter(0.3, "How fast, forward and backward.", unit="m/s", gt=0.0, le=2.0)
+    yaw_rate: float = parameter(0.8, "Yaw rate limit.", unit="rad/s", gt=0.0, le=3.0)
+
+
+class ManoeuvreRecovery(GuardedRecovery):
+    """Base of the recoveries that drive a manoeuvre."""
+
+    parameters: ManoeuvreParameters
+
+    def drive_along(self, begin: Pose, steps: list[Step], request: RecoveryRequest) -> RecoveryResult:
+        """Drive steps that begin at ``begin``, section by section, to the end or to what a command is refused for."""
+        frame = Transform(begin.position, begin.orientation, begin.frame_id, "begin")
+        at: PlanarPose = (0.0, 0.0, 0.0)
+        for gear, section in groupby(steps, key=lambda step: step.gear):
+            planned = [at, *(pose for step in section for pose in step.poses)]
+            poses = [frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id="begin")) for x, y, yaw in planned]
+            result = self._turn(request, poses[-1]) if gear == 0 else self._follow(request, poses, gear)
+            if not result.success:
+                return result
+            at = planned[-1]
+        return RecoveryResult(RecoveryOutcome.SUCCESS)
+
+    def _follow(self, request: RecoveryRequest, poses: list[Pose], gear: int) -> RecoveryResult:
+        """Drive along poses in one gear, by pure pursuit; the last one is prolonged for the point steered to."""
+        last = np.asarray(poses[-1].position) + poses[-1].rotation[:, 0] * (gear * LOOKAHEAD)
+        points = np.array([*(pose.position for pose in poses), last])
+        tracker = PathTracker(Path.from_points(points, frame_id=poses[0].frame_id))
+        speed, limit = gear * self.parameters.speed, self.parameters.yaw_rate
+
+        def finished(pose: Pose) -> bool:
+            tracker.update(pose.position)
+            return tracker.remaining <= LOOKAHEAD + END_REACHED
+
+        def velocity(pose: Pose) -> Twist:
+            _, curvature = arc_to(pose, tracker.point_at(tracker.progress + LOOKAHEAD))
+            return Twist.planar(vx=speed, wz=max(-limit, min(limit, speed * curvature)))
+
+        return self.drive(request, velocity, finished)
+
+    def _turn(self, request: RecoveryRequest, end: Pose) -> RecoveryResult:
+        """Turn on the spot to a heading."""
+
+        def left(pose: Pose) -> float:
+            return normalize_angle(end.yaw - pose.yaw)
+
+        def velocity(pose: Pose) -> Twist:
+            limit = self.parameters.yaw_rate
+            return Twist.planar(wz=max(-limit, min(limit, 2.0 * left(pose))))
+
+        return self.drive(request, velocity, lambda pose: abs(left(pose)) <= HEADING_REACHED)
