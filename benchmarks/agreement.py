@@ -1,10 +1,15 @@
 """Do planners and controllers agree about what is free? Every installed pair, over small random worlds of both maps.
 
 A path that a planner returns is driven without inertia on a map that does not change. A pair agrees if the outline fits
-at every pose of the path, and if the controller does not refuse the plans of one place twice. Rooms of 6 m x 6 m with
-boxes and walls with gaps; on the costmap a robot of 1.0 m x 0.5 m, on the mesh a disc of 0.25 m.
+at every pose of the path, if the controller does not refuse the plans of one place twice, and if the robot arrives. So
+a robot does not agree that stands, goes about until its time is over, or is led to where the planner knows no path
+any more. Rooms of 6 m x 6 m with boxes and walls with gaps; on the costmap a robot of 1.0 m x 0.5 m, on the mesh a disc
+of 0.25 m. With ``--open`` no walls stand around: the map ends in free ground; that of a mesh always does, on two sides.
 
     python benchmarks/agreement.py [--quick] [--json] [--seeds 0:40] [--map costmap] [--planners a,b] [--controllers c]
+                                   [--open] [--results FILE]
+
+``--results`` keeps every finished drive as a JSON line; a drive that is in the file is not repeated.
 """
 
 from __future__ import annotations
@@ -13,292 +18,84 @@ import argparse
 import json
 import math
 import statistics
+import tempfile
 import time
-from abc import ABC, abstractmethod
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
 from typing import Any
 
-import numpy as np
+from agreement_worlds import PERIOD, WORLDS, World
 
 from mbf_abstract.config.registry import PluginRegistry
-from mbf_abstract.geometry import Pose, Twist, quaternions_from_axes
-from mbf_abstract.geometry.arcs import arc_poses
-from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
-from mbf_costmap_nav.grid.costmap import Costmap
-from mbf_costmap_nav.grid.footprint_check import FootprintCheck
-from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_costmap_nav.plugins import CostmapContext
-from mbf_mesh_nav.kernels.search.forbidden_surface import rank_at
-from mbf_mesh_nav.layers.inflation import InflationLayer
-from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
-from mbf_mesh_nav.map.layer_graph import LayerGraph
-from mbf_mesh_nav.map.mesh_map import MeshMap
-from mbf_mesh_nav.plugins import MeshContext
+from terrain.sweeps.log import SweepLog
 
-SIDE, RESOLUTION, PERIOD = 6.0, 0.05, 0.05
-OUTLINE = [(0.5, 0.25), (-0.5, 0.25), (-0.5, -0.25), (0.5, -0.25)]
-RADIUS = 0.25
-PADDED = PlaceQuery(use_padded_footprint=True)
 DIST_TOLERANCE, ANGLE_TOLERANCE = 0.1, 0.25
-LONGEST = 90.0  # s
+LONGEST, STANDING = 90.0, 20.0  # s
 SAME_PLACE = 0.1  # m
 NEEDS_PLANNER = {"mesh.vector_field": "cvp"}  # a controller that follows what only this planner adds to its path
 
 
-class Clock:
-    """Time that a drive moves."""
-
-    time = 1.0
-
-    def now(self) -> float:
-        """Time [s]."""
-        return self.time
-
-
-class Robot:
-    """Where it is; nothing asks for it here."""
-
-    def pose(self) -> Pose:
-        """Pose at the origin."""
-        return Pose.planar(0.0, 0.0)
-
-    def velocity(self) -> Twist:
-        """Zero."""
-        return Twist()
-
-    def recent_track(self) -> np.ndarray:
-        """Nothing driven."""
-        return np.zeros((0, 3))
-
-
-@dataclass(frozen=True)
-class Box:
-    """A part of the floor where nothing may stand [m]."""
-
-    x0: float
-    x1: float
-    y0: float
-    y1: float
-
-    def holds(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Which points lie in it."""
-        return (x >= self.x0) & (x < self.x1) & (y >= self.y0) & (y < self.y1)
-
-
-def random_boxes(rng: np.random.Generator) -> list[Box]:
-    """Walls around, four to eleven boxes, and up to two walls with a gap of 0.7 to 1.5 m."""
-    boxes = [
-        Box(0, SIDE, 0, 0.05),
-        Box(0, SIDE, SIDE - 0.05, SIDE),
-        Box(0, 0.05, 0, SIDE),
-        Box(SIDE - 0.05, SIDE, 0, SIDE),
-    ]
-    for _ in range(rng.integers(4, 12)):
-        (x, y), (w, h) = rng.uniform(0.0, SIDE, 2), rng.uniform(0.1, 1.0, 2)
-        boxes.append(Box(x, x + w, y, y + h))
-    for _ in range(rng.integers(0, 3)):
-        at, gap = rng.uniform(0.2 * SIDE, 0.8 * SIDE), rng.uniform(0.7, 1.5)
-        begin = rng.uniform(0.0, SIDE - gap)
-        parts = [Box(at, at + 0.1, 0, begin), Box(at, at + 0.1, begin + gap, SIDE)]
-        boxes += parts if rng.random() < 0.5 else [Box(p.y0, p.y1, p.x0, p.x1) for p in parts]
-    return boxes
-
-
-class World(ABC):
-    """One floor with its map, and a start and a goal where the robot fits; None as ends if there are none."""
-
-    backend: str
-    map: Any
-
-    def __init__(self, seed: int) -> None:
-        self.clock = Clock()
-        rng = np.random.default_rng(seed)
-        self.build(random_boxes(rng))
-        self.ends = self._ends(rng)
-
-    @abstractmethod
-    def build(self, boxes: list[Box]) -> None:
-        """Make the map of a floor with boxes."""
-
-    @abstractmethod
-    def plugin(self, kind: PluginKind, name: str) -> Any:
-        """Make a plugin on the map, with its defaults."""
-
-    @abstractmethod
-    def pose_on(self, x: float, y: float, yaw: float) -> Pose:
-        """Pose of a robot that stands on the floor."""
-
-    @abstractmethod
-    def fits(self, pose: Pose) -> bool:
-        """Whether the outline touches nothing."""
-
-    def first_misfit(self, path: Any) -> int:
-        """Index of the first pose of a path at which a controller's check finds a collision; -1 if it fits at all."""
-        return next((index for index, pose in enumerate(path) if not self.fits(pose)), -1)
-
-    def moved(self, pose: Pose, command: Any) -> Pose:
-        """Where a robot without inertia is one period later."""
-        turn = (pose.x, pose.y, pose.yaw), command.vx, command.vy, command.wz
-        return self.pose_on(*arc_poses(*turn, PERIOD, PERIOD)[-1].tolist())
-
-    def _ends(self, rng: np.random.Generator) -> tuple[Pose, Pose] | None:
-        found: list[Pose] = []
-        for _ in range(2000):
-            pose = self.pose_on(*rng.uniform(0.3, SIDE - 0.3, 2), rng.uniform(-math.pi, math.pi))
-            if self.fits(pose) and not (found and pose.distance_to(found[0]) < 1.5):
-                found.append(pose)
-            if len(found) == 2:
-                return found[0], found[1]
-        return None
-
-
-class CostmapWorld(World):
-    """A robot of 1.0 m x 0.5 m on a costmap."""
-
-    backend = "costmap"
-
-    def build(self, boxes: list[Box]) -> None:
-        """Make the map of a floor with boxes."""
-        centres = (np.arange(round(SIDE / RESOLUTION)) + 0.5) * RESOLUTION
-        x, y = np.meshgrid(centres, centres)
-        cells = np.where(np.any([box.holds(x, y) for box in boxes], axis=0), 254, 0).astype(np.uint8)
-        layers = ({"name": "walls", "type": "static"}, {"name": "inflation", "type": "inflation"})
-        parameters = CostmapParameters(resolution=RESOLUTION, footprint=OUTLINE, max_age=0.0, layers=layers)
-        inflation = {"inflation_radius": 0.8, "cost_scaling_factor": 5.0}
-        self.map = build_layered_costmap(parameters, {"inflation": inflation}, static_map=Costmap(cells, RESOLUTION))
-        self.map.update(Pose.planar(0.0, 0.0), 0.0)
-
-    def plugin(self, kind: PluginKind, name: str) -> Any:
-        """Make a plugin on the map, with its defaults."""
-        plugin_class = PluginRegistry("costmap").load(kind, name)
-        maps = {"local": self.map, "global": self.map}
-        common = "dut", plugin_class.Parameters(), self.clock, np.random.default_rng(0), Robot(), self.map
-        return plugin_class(CostmapContext(*common, maps=maps, transforms=TransformBuffer()))
-
-    def first_misfit(self, path: Any) -> int:
-        """As for all; here with the samples of the controllers."""
-        check, costmap = FootprintCheck(self.map.footprint, RESOLUTION), self.map.snapshot()
-        return check.first_collision(costmap, np.array([(pose.x, pose.y, pose.yaw) for pose in path]))
-
-    def pose_on(self, x: float, y: float, yaw: float) -> Pose:
-        """Pose of a robot that stands on the floor."""
-        return Pose.planar(x, y, yaw)
-
-    def fits(self, pose: Pose) -> bool:
-        """Whether the outline touches nothing."""
-        centre = self.map.snapshot().cost_at(pose.x, pose.y)
-        return centre is not None and centre < 253 and self.map.pose_check(PADDED)(pose).state < CellState.LETHAL
-
-
-class PaintedLayer(MeshLayer):
-    """Lethal in the boxes."""
-
-    boxes: list[Box] = []  # noqa: RUF012 - set for one world
-
-    def compute(self) -> tuple[np.ndarray, np.ndarray]:
-        """Costs and flags."""
-        x, y = self.topology.vertices[:, :2].T
-        lethal = np.any([box.holds(x, y) for box in self.boxes], axis=0)
-        return np.where(lethal, np.inf, 0.0).astype(np.float32), lethal
-
-
-class MeshWorld(World):
-    """A disc of 0.25 m on gentle bumps."""
-
-    backend = "mesh"
-
-    def build(self, boxes: list[Box]) -> None:
-        """Make the map of a floor with boxes."""
-        spacing = 0.1
-        x, y = np.meshgrid(*2 * [np.arange(round(SIDE / spacing) + 1) * spacing])
-        self.map = MeshMap.from_heights(0.05 * np.sin(1.5 * x) * np.cos(1.2 * y), spacing, spacing)
-        self.map.inscribed_radius = RADIUS
-        common = self.map.topology, self.map.locator
-        walls = PaintedLayer(LayerContext("walls", *common, PaintedLayer.Parameters()))
-        walls.boxes = boxes
-        inflation = InflationLayer.Parameters(inscribed_radius=RADIUS, inflation_radius=0.6)
-        shown = InflationLayer(LayerContext("inflation", *common, inflation, (walls,)))
-        for layer in (walls, shown):
-            layer.recompute()
-        self.map.set_layers(LayerGraph([walls, shown]), "inflation", 1.0)
-
-    def plugin(self, kind: PluginKind, name: str) -> Any:
-        """Make a plugin on the map, with its defaults."""
-        plugin_class = PluginRegistry("mesh").load(kind, name)
-        common = "dut", plugin_class.Parameters(), self.clock, np.random.default_rng(0), Robot(), self.map
-        return plugin_class(MeshContext(*common, transforms=TransformBuffer()))
-
-    def pose_on(self, x: float, y: float, yaw: float) -> Pose:
-        """Pose of a robot that stands on the floor, straight below or above (x, y)."""
-        spot = self.map.locate_one((x, y, 0.0))
-        for _ in range(2):  # the nearest place of a slope lies beside (x, y); a robot would slide 4 cm/s
-            spot = self.map.locate_one((x, y, float(spot.point[2])))
-        ahead = np.array([[math.cos(yaw), math.sin(yaw), 0.0]])
-        orientation = quaternions_from_axes(ahead, self.map.face_normals[spot.face][None])[0]
-        return Pose(tuple(spot.point.tolist()), tuple(orientation.tolist()))
-
-    def first_misfit(self, path: Any) -> int:
-        """As for all; the controllers look at the inflated costs below the robot's middle."""
-        ranks, mesh = self.map.snapshot().traversability_rank(1.0), self.map.topology
-        for index, pose in enumerate(path):
-            spot = self.map.locate_one(pose.position)
-            if rank_at(mesh.vertices, mesh.faces, ranks, spot.face, tuple(spot.point.tolist())) > 0.0:
-                return index
-        return -1
-
-    def fits(self, pose: Pose) -> bool:
-        """Whether the outline touches nothing."""
-        return self.map.pose_check(PADDED)(pose).state < CellState.LETHAL
-
-
-WORLDS = {world.backend: world for world in (CostmapWorld, MeshWorld)}
-
-
 @dataclass(frozen=True)
 class Verdict:
-    """How a drive ended: arrived, no path, misfit, refused, touched or stands; with what was said, and where."""
+    """How a drive ended, with what was said, and where.
+
+    arrived, no path (from the start), stranded (no path any more), misfit, refused, touched, stands, or late.
+    """
 
     ending: str
     message: str
     pose: Pose
+    plan_ms: float
+    """Milliseconds of CPU that the first plan took."""
 
     @property
     def agrees(self) -> bool:
-        """Whether the controller accepted what the planner returned."""
-        return self.ending in ("arrived", "no path", "stands")
+        """Whether the robot arrived on what the planner returned, if it returned anything."""
+        return self.ending in ("arrived", "no path")
 
 
 def drive(world: World, planner: Any, controller: Any) -> Verdict:
     """Plan and drive from the world's start to its goal; plan again once where the controller refuses."""
     pose, goal = world.ends
-    path, velocity, refused_at = None, Twist(), None
+    path, velocity, refused_at, track, plan_ms = None, Twist(), None, [pose], math.nan
+
+    def ended(ending: str, message: str = "", at: Pose | None = None) -> Verdict:
+        return Verdict(ending, message, at or pose, plan_ms)
+
     for _ in range(round(LONGEST / PERIOD)):
         if path is None:
+            begin = time.process_time()
             plan = planner.make_plan(PlanRequest(pose, goal))
+            plan_ms = 1e3 * (time.process_time() - begin) if math.isnan(plan_ms) else plan_ms
             if not plan.success:
-                return Verdict("no path", f"{int(plan.outcome)} {plan.message}", pose)
+                return ended("no path" if len(track) == 1 else "stranded", f"{int(plan.outcome)} {plan.message}")
             path = plan.path
             if (index := world.first_misfit(path)) >= 0:
-                return Verdict("misfit", f"pose {index} of {len(path)}", path[index])
+                return ended("misfit", f"pose {index} of {len(path)}", path[index])
             if not controller.set_plan(path):
-                return Verdict("refused", "set_plan", pose)
+                return ended("refused", "set_plan")
         if controller.is_goal_reached(pose, DIST_TOLERANCE, ANGLE_TOLERANCE):
-            return Verdict("arrived", "", pose)
+            return ended("arrived")
         result = controller.compute_velocity_commands(ControlRequest(pose, velocity))
         world.clock.time += PERIOD
         if result.success:
             velocity = result.command
             pose = world.moved(pose, velocity)
+            track.append(pose)
             continue
         if not world.fits(pose):
-            return Verdict("touched", f"{int(result.outcome)} {result.message}", pose)
+            return ended("touched", f"{int(result.outcome)} {result.message}")
         if refused_at is not None and pose.distance_to(refused_at) < SAME_PLACE:
-            return Verdict("refused", f"{int(result.outcome)} {result.message}", pose)
+            return ended("refused", f"{int(result.outcome)} {result.message}")
         refused_at, path, velocity = pose, None, Twist()
-    return Verdict("stands", f"after {LONGEST:g} s", pose)
+    since = track[-1 - min(round(STANDING / PERIOD), len(track) - 1) :]
+    stands = all(pose.distance_to(one) < SAME_PLACE for one in since)
+    return ended("stands" if stands else "late", f"after {LONGEST:g} s")
 
 
 def installed(backend: str, kind: PluginKind) -> list[str]:
@@ -316,27 +113,28 @@ def pairs(backend: str) -> list[tuple[str, str]]:
     ]
 
 
-def run(backend: str, seeds: range, planners: list[str], controllers: list[str], out: Any) -> dict[str, Any]:
-    """Drive every pair over all seeds; endings by pair, and the milliseconds of CPU of the first plans by planner."""
-    endings: dict[str, Counter[str]] = {}
-    times: dict[str, list[float]] = {}
-    for seed in seeds:
-        for planner, controller in pairs(backend):
-            if (planners and planner not in planners) or (controllers and controller not in controllers):
-                continue
-            world = WORLDS[backend](seed)
+def run(backend: str, seeds: range, chosen: argparse.Namespace, log: SweepLog) -> Iterator[dict[str, Any]]:
+    """Drive every chosen pair over all seeds, or read how it ended; one row for each drive."""
+    for seed, (planner, controller) in product(seeds, pairs(backend)):
+        if planner not in (chosen.planners or [planner]) or controller not in (chosen.controllers or [controller]):
+            continue
+        key = "/".join((backend, planner, controller, str(seed), *["open"] * chosen.open))
+        if key not in log.rows:
+            world = WORLDS[backend](seed, chosen.open)
             if world.ends is None:
                 continue
-            made = world.plugin(PluginKind.PLANNER, planner)
-            begin = time.process_time()
-            made.make_plan(PlanRequest(*world.ends))
-            times.setdefault(planner, []).append(1e3 * (time.process_time() - begin))
-            verdict = drive(world, made, world.plugin(PluginKind.CONTROLLER, controller))
-            endings.setdefault(f"{planner} + {controller}", Counter())[verdict.ending] += 1
-            if not verdict.agrees or verdict.ending == "stands":
-                where = f"({verdict.pose.x:.2f}, {verdict.pose.y:.2f}, {verdict.pose.yaw:.2f})"
-                out(f"{seed} {planner} + {controller}: {verdict.ending} at {where}: {verdict.message}")
-    return {"endings": endings, "plan_ms": {name: statistics.median(values) for name, values in times.items()}}
+            made = world.plugin(PluginKind.PLANNER, planner), world.plugin(PluginKind.CONTROLLER, controller)
+            verdict = drive(world, *made)
+            place = tuple(round(value, 2) for value in (verdict.pose.x, verdict.pose.y, verdict.pose.yaw))
+            kept = {name: getattr(verdict, name) for name in ("ending", "message", "agrees", "plan_ms")}
+            of = {"map": backend, "pair": f"{planner} + {controller}", "planner": planner, "seed": seed}
+            log.append(key, {**of, **kept, "place": place})
+        yield log.rows[key]
+
+
+def names(text: str) -> list[str]:
+    """Names between commas."""
+    return [name for name in text.split(",") if name]
 
 
 def main() -> None:
@@ -345,20 +143,29 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--seeds", default="0:40")
     parser.add_argument("--map", choices=[*WORLDS], default=None)
-    parser.add_argument("--planners", default="")
-    parser.add_argument("--controllers", default="")
+    parser.add_argument("--planners", type=names, default=[])
+    parser.add_argument("--controllers", type=names, default=[])
+    parser.add_argument("--open", action="store_true", help="no walls around")
+    parser.add_argument("--results", type=Path, default=None, help="file of finished drives")
     chosen = parser.parse_args()
     seeds = range(5) if chosen.quick else range(*map(int, chosen.seeds.split(":")))
-    only = [[name for name in names.split(",") if name] for names in (chosen.planners, chosen.controllers)]
-    out = (lambda _: None) if chosen.json else lambda line: print(line, flush=True)
-    results = {backend: run(backend, seeds, *only, out) for backend in ([chosen.map] if chosen.map else WORLDS)}
+    rows = []
+    with tempfile.TemporaryDirectory() as folder, SweepLog(chosen.results or Path(folder) / "drives.jsonl") as log:
+        for backend in [chosen.map] if chosen.map else WORLDS:
+            for row in run(backend, seeds, chosen, log):
+                rows.append(row)
+                if not row["agrees"] and not chosen.json:
+                    print("{seed} {pair}: {ending} at {place}: {message}".format_map(row), flush=True)
     if chosen.json:
-        print(json.dumps(results))
+        print(json.dumps(rows))
         return
-    for backend, result in results.items():
-        for pair, endings in result["endings"].items():
-            print(f"{backend:8} {pair:45} " + ", ".join(f"{ending} {count}" for ending, count in endings.most_common()))
-        print(f"{backend:8} median plan [ms]:", {name: round(value, 2) for name, value in result["plan_ms"].items()})
+    for backend, pair in dict.fromkeys((row["map"], row["pair"]) for row in rows):
+        endings = Counter(row["ending"] for row in rows if (row["map"], row["pair"]) == (backend, pair))
+        print(f"{backend:8} {pair:45} " + ", ".join(f"{ending} {count}" for ending, count in endings.most_common()))
+    for backend, planner in dict.fromkeys((row["map"], row["planner"]) for row in rows):
+        taken = [row["plan_ms"] for row in rows if (row["map"], row["planner"]) == (backend, planner)]
+        print(f"{backend:8} {planner:45} median plan {statistics.median(taken):.2f} ms of CPU")
+    print(f"{len(rows)} drives, {sum(not row['agrees'] for row in rows)} do not agree")
 
 
 if __name__ == "__main__":

@@ -134,6 +134,14 @@ class NavigationMap(ABC):
         """
         return self.obstacle_ahead(pose, command, duration)
 
+    def obstacle_on_path(self, pose: Pose, command: Twist, duration: float) -> str:
+        """As ``obstacle_ahead``, for a robot that follows a path which stays on the map.
+
+        The end of the map is an obstacle for the robot's centre only, as it is for planners: beside a free end of the
+        map they allow an outline to reach over it.
+        """
+        return self.obstacle_ahead(pose, command, duration)
+
     @abstractmethod
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
         """Offset [m] from ``pose`` to the nearest obstacle, along the axes of the map; None if none is ``within`` [m].

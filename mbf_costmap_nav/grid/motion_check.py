@@ -34,6 +34,7 @@ def obstacle_ahead(
     duration: float,
     *,
     leaves_collisions: bool = False,
+    may_overhang: bool = False,
 ) -> str:
     """Where the motion would touch more obstacle cells or map border than now, as a text; empty if it is free.
 
@@ -45,22 +46,27 @@ def obstacle_ahead(
         Kept for ``duration`` [s].
     leaves_collisions : bool
         Whether the motion was chosen to lead out of a collision, however deep it is.
+    may_overhang : bool
+        Whether the footprint may reach over the map's border as long as the base does not leave the map.
     """
-    allowed, _ = blocked_cells(costmap, footprint, pose.x, pose.y, pose.yaw)
+
+    def blocked_at(x: float, y: float, yaw: float) -> tuple[int, int]:
+        return blocked_cells(costmap, footprint, x, y, yaw, counts_border=not may_overhang)
+
+    collision = (LETHAL,) if may_overhang else (LETHAL, OUTSIDE)
+    check = _check(footprint, costmap.resolution)
+    allowed, _ = blocked_at(pose.x, pose.y, pose.yaw)
+    on_map = costmap.contains(pose.x, pose.y)
     outline_speed = command.speed + abs(command.wz) * footprint.circumscribed_radius
     step = float(np.clip(0.5 * costmap.resolution / max(outline_speed, 1e-6), duration / 100.0, duration))
     ahead = arc_poses((pose.x, pose.y, pose.yaw), command.vx, command.vy, command.wz, duration, step)
     for x, y, yaw in ahead.tolist():
-        blocked, covered = blocked_cells(costmap, footprint, x, y, yaw)
-        deeper = blocked > allowed and (allowed > 0 or _collides(costmap, footprint, x, y, yaw))
-        if deeper or (blocked == covered and not leaves_collisions):
+        blocked, covered = blocked_at(x, y, yaw)
+        deeper = blocked > allowed and (allowed > 0 or check.cost(costmap, x, y, yaw) in collision)
+        leaves_map = may_overhang and on_map and not costmap.contains(x, y)
+        if deeper or leaves_map or (blocked == covered and not leaves_collisions):
             return obstacle_text(f"({x:.2f}, {y:.2f}, {yaw:.2f} rad)")
     return ""
-
-
-def _collides(costmap: Costmap, footprint: Footprint, x: float, y: float, yaw: float) -> bool:
-    """Whether the samples of the footprint touch a lethal cell or leave the map."""
-    return _check(footprint, costmap.resolution).cost(costmap, x, y, yaw) in (LETHAL, OUTSIDE)
 
 
 @lru_cache(maxsize=8)
@@ -68,15 +74,17 @@ def _check(footprint: Footprint, resolution: float) -> FootprintCheck:
     return FootprintCheck(footprint, resolution)
 
 
-def blocked_cells(costmap: Costmap, footprint: Footprint, x: float, y: float, yaw: float) -> tuple[int, int]:
-    """How many of the cells under the footprint are lethal or off the map, and how many there are in all.
+def blocked_cells(
+    costmap: Costmap, footprint: Footprint, x: float, y: float, yaw: float, *, counts_border: bool = True
+) -> tuple[int, int]:
+    """How many of the cells under the footprint are lethal or, if the border counts, off the map; how many in all.
 
     Each cell counts once, whatever part of it is covered. So a robot that backs out of a collision touches less and
     less; counted by samples, an obstacle weighs more under the outline, where they are denser.
     """
     corners = footprint.at(x, y, yaw) if len(footprint.vertices) > 2 else np.array([[x, y]])
     origin = np.array([costmap.origin_x, costmap.origin_y])
-    blocked, covered = blocked_under(costmap.cells, (corners - origin) / costmap.resolution)
+    blocked, covered = blocked_under(costmap.cells, (corners - origin) / costmap.resolution, counts_border)
     return int(blocked), int(covered)
 
 

@@ -86,6 +86,10 @@ class SnapshotAnswers(LayeredMap):
         """Where the footprint would touch more than now if the robot kept ``command`` for ``duration`` [s]."""
         return obstacle_ahead(self.snapshot(), self.footprint, pose, command, duration)
 
+    def obstacle_on_path(self, pose: Pose, command: Twist, duration: float) -> str:
+        """As ``obstacle_ahead``, where the footprint may reach over the end of the map."""
+        return obstacle_ahead(self.snapshot(), self.footprint, pose, command, duration, may_overhang=True)
+
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
         """Offset [m] to the centre of the nearest lethal cell; None if none is ``within`` [m]."""
         return nearest_lethal(self.snapshot(), pose, within)

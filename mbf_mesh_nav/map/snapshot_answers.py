@@ -91,7 +91,13 @@ class SnapshotAnswers(OutlinedMap):
         """As ``obstacle_ahead``, where only lethal ground is forbidden."""
         return self._obstacle(pose, command, duration, np.inf)
 
-    def _obstacle(self, pose: Pose, command: Twist, duration: float, cost_limit: float) -> str:
+    def obstacle_on_path(self, pose: Pose, command: Twist, duration: float) -> str:
+        """As ``obstacle_ahead``, where the robot may reach over a border with all but its centre."""
+        return self._obstacle(pose, command, duration, FORBIDDEN_COST, may_overhang=True)
+
+    def _obstacle(
+        self, pose: Pose, command: Twist, duration: float, cost_limit: float, may_overhang: bool = False
+    ) -> str:
         place = self.locate_one(pose.position, SURFACE_DISTANCE)
         if place is None:
             return f"the robot is more than {SURFACE_DISTANCE:g} m from the surface"
@@ -100,11 +106,12 @@ class SnapshotAnswers(OutlinedMap):
             return f"the ground slopes {slope:.2f} rad, turning is allowed up to {self.max_turning_slope:g} rad"
         ranks = self.snapshot().traversability_rank(cost_limit)
         if turns and self.footprint:
-            swept = swept_obstacle(self.topology, ranks, place, pose, command, duration, self.footprint)
-            if swept:
+            motion = place, pose, command, duration, self.footprint
+            if swept := swept_obstacle(self.topology, ranks, *motion, may_overhang=may_overhang):
                 return swept
         radius = self.inscribed_radius or UNKNOWN_RADIUS
-        return forbidden_ahead(self.topology, ranks, place, pose, command, duration, radius)
+        locator = self.locator if may_overhang else None
+        return forbidden_ahead(self.topology, ranks, place, pose, command, duration, radius, locator)
 
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
         """Offset [m] to the nearest lethal vertex of the robot's storey; None if none is ``within`` [m]."""

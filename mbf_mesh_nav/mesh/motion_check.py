@@ -2,7 +2,8 @@
 
 The robot's centre is walked over the surface along the arc of its command, and on by its radius in the direction it
 then has. Forbidden surface ends the motion, and so does a border; a robot that stands on forbidden
-surface may leave it, see ``kernels.search.forbidden_surface``. What its sides would touch is in the costs: on a map
+surface may leave it, see ``kernels.search.forbidden_surface``. A robot that follows a path may reach over a border with
+all but its centre. What its sides would touch is in the costs: on a map
 that is not inflated only what lies straight ahead counts. What turns on the spot is checked in ``turning``, too.
 """
 
@@ -16,8 +17,10 @@ from mbf_abstract.maps.controllers.failures import obstacle_text
 from mbf_mesh_nav.arrays import BoolArray, Float32Array
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned, walk
+from mbf_mesh_nav.kernels.mesh.vectors import Vector
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter, rank_at
-from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.mesh.borders import on_surface
+from mbf_mesh_nav.mesh.locate import SurfaceLocator, SurfacePoint
 from mbf_mesh_nav.mesh.positions import position_text, vector_of
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
@@ -37,6 +40,7 @@ def forbidden_ahead(
     command: Twist,
     duration: float,
     radius: float,
+    overhangs: SurfaceLocator | None = None,
 ) -> str:
     """Where the motion would lead onto forbidden surface or past a border, as a text; empty if it is free.
 
@@ -50,6 +54,8 @@ def forbidden_ahead(
         Kept for ``duration`` [s].
     radius : float
         How far [m] the robot reaches beyond its centre.
+    overhangs : SurfaceLocator, optional
+        Of the surface, if the robot may reach over a border as long as its centre stays on the surface.
     """
     face, point = place.face, vector_of(place.point)
     stands_on = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
@@ -64,14 +70,42 @@ def forbidden_ahead(
         face, point, direction, done = walk(
             mesh.vertices, mesh.faces, mesh.face_neighbours, mesh.face_normals, face, point, direction, stride
         )
-        if done < stride - 1e-6:
+        ends = done < stride - 1e-6
+        if ends and overhangs is None:
             return f"the surface ends at {position_text(point)}"
         comes_to = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
         if not may_enter(stands_on, comes_to):
             return obstacle_text(position_text(point))
+        if ends:
+            past = on_arc - walked - done
+            return _past_border(mesh, overhangs, face, point, direction, past, command.wz / command.speed)
         stands_on, walked = comes_to, walked + stride
         if command.wz != 0.0 and walked < on_arc:
             direction = turned(direction, vector_of(mesh.face_normals[face]), command.wz * stride / command.speed)
+    return ""
+
+
+def _past_border(
+    mesh: MeshTopology,
+    locator: SurfaceLocator,
+    face: int,
+    point: Vector,
+    direction: Vector,
+    distance: float,
+    curvature: float,
+) -> str:
+    """Where a motion that comes to a border at ``point`` leads farther past it than is slack, as a text.
+
+    It goes on from there for ``distance`` [m] in the plane of the last face, which is how a path is followed that runs
+    along the border.
+    """
+    place, normal, left = np.array(point), vector_of(mesh.face_normals[face]), distance
+    while left > 0.0:
+        stride = min(STRIDE, left)
+        place, left = place + stride * np.array(direction), left - stride
+        if on_surface(mesh, locator, place, SURFACE_DISTANCE) is None:
+            return f"the surface ends at {position_text(point)}"
+        direction = turned(direction, normal, stride * curvature)
     return ""
 
 

@@ -44,6 +44,7 @@ def swept_obstacle(
     command: Twist,
     duration: float,
     corners: Sequence[Sequence[float]],
+    may_overhang: bool = False,
 ) -> str:
     """Where an outline would touch more lethal ground, or border, than it does now, as a text; empty if nowhere.
 
@@ -57,6 +58,8 @@ def swept_obstacle(
         Kept for ``duration`` [s], or until it has turned once.
     corners : (n, 2) float
         Of the outline [m].
+    may_overhang : bool
+        Whether it may reach over a border.
     """
     points = points_on(corners)
     distances = norm(points)
@@ -70,7 +73,7 @@ def swept_obstacle(
     point, normal = vector_of(place.point), vector_of(mesh.face_normals[place.face])
     ahead = turned(tangent(vector_of(pose.rotation[:, 0]), normal), normal, course)
     step = command.speed * seconds, command.wz * seconds, steps
-    touched, corner = sweep(mesh.surface, ranks, place.face, point, ahead, outline, *step)
+    touched, corner = sweep(mesh.surface, ranks, place.face, point, ahead, outline, *step, not may_overhang)
     return obstacle_text(position_text(corner)) if touched else ""
 
 

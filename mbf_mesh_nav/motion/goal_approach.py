@@ -10,6 +10,7 @@ import numpy as np
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
+from mbf_abstract.maps.controllers.turn_at_goal import TurnAtGoal
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
 
@@ -46,25 +47,21 @@ class GoalApproach:
 
     def __init__(self, goal: Pose, reach: float, straying: float = 0.0) -> None:
         self.goal = goal
-        self._reach = reach
         self._straying = straying
-        self._only_turning = False
+        self._turn_at_goal = TurnAtGoal(reach)
 
     def is_reached(self, pose: Pose, tracker: PathTracker, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the robot has driven to the end of the path and stands there within the tolerances [m, rad]."""
-        self._reach = min(self._reach, dist_tolerance)
+        self._turn_at_goal.take_tolerances(dist_tolerance, angle_tolerance)
         tracker.update(pose.position)
         driven = self._has_driven(tracker, dist_tolerance)
         return driven and is_at_goal(pose, self.goal, dist_tolerance, angle_tolerance)
 
     def is_only_turning(self, pose: Pose, tracker: PathTracker) -> bool:
-        """Whether only the heading is left, with the pose of this cycle.
-
-        Once there, the robot may drift twice as far before it has to drive again, so turning does not flicker.
-        """
-        reach = self._reach * (2.0 if self._only_turning else 1.0)
-        self._only_turning = self._has_driven(tracker, reach) and ground_distance(pose, self.goal) <= reach
-        return self._only_turning
+        """Whether only the heading is left, with the pose of this cycle, see ``TurnAtGoal``."""
+        limit = self._turn_at_goal.limit
+        is_near = self._has_driven(tracker, limit) and ground_distance(pose, self.goal) <= limit
+        return self._turn_at_goal.update(is_near, heading_error(pose, self.goal))
 
     def _has_driven(self, tracker: PathTracker, reach: float) -> bool:
         return tracker.has_arrived(reach + self._straying * tracker.deviation)

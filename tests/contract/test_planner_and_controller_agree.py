@@ -13,7 +13,9 @@ pytestmark = pytest.mark.usefixtures("one_core")
 SOURCE = Path(__file__).resolve().parents[2] / "benchmarks" / "agreement.py"
 SPEC = spec_from_file_location("agreement", SOURCE)
 agreement = sys.modules["agreement"] = module_from_spec(SPEC)
+sys.path.insert(0, str(SOURCE.parent))  # it imports its worlds
 SPEC.loader.exec_module(agreement)
+sys.path.remove(str(SOURCE.parent))
 
 PLANNED = range(8)
 DRIVEN = {"costmap": [8, 16], "mesh": [1]}
@@ -24,6 +26,8 @@ REFUSED = (
     ("straight_line", "follow_path", 20), ("theta_star", "follow_path", 20), ("astar", "follow_path", 23),
 )  # fmt: skip
 """Drives on the costmap that were refused twice at one place."""
+ALONG_THE_END = (("costmap", "astar", 8, True), ("costmap", "theta_star", 8, True), ("mesh", "dijkstra", 300, False))
+"""Planners whose paths lead along a free end of the map; whether no walls stand around."""
 FOLLOWERS = {"regulated_pure_pursuit", "follow_path", "path_follower"}
 """Controllers that keep to their path; those that sample motions may leave it, and are only counted."""
 
@@ -60,3 +64,11 @@ def test_no_plan_is_refused_twice_on_a_map_that_does_not_change(backend, planner
     made = world.plugin(PluginKind.PLANNER, planner), world.plugin(PluginKind.CONTROLLER, controller)
     verdict = agreement.drive(world, *made)
     assert verdict.agrees, verdict
+
+
+@pytest.mark.parametrize(("backend", "planner", "seed", "is_open"), ALONG_THE_END)
+def test_a_plan_along_a_free_end_of_the_map_is_driven(backend, planner, seed, is_open):
+    world = agreement.WORLDS[backend](seed, is_open)
+    made = world.plugin(PluginKind.PLANNER, planner), world.plugin(PluginKind.CONTROLLER, "follow_path")
+    verdict = agreement.drive(world, *made)
+    assert verdict.ending == "arrived", verdict

@@ -27,6 +27,7 @@ from mbf_abstract.maps.controllers.room_to_turn import (
     poses_ahead,
     wider_curves,
 )
+from mbf_abstract.maps.controllers.turn_at_goal import TurnAtGoal
 from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.queries import AS_CONFIGURED, CellState
 from mbf_abstract.outcomes import ExePathOutcome
@@ -62,6 +63,7 @@ class FollowPathParameters(PluginParameters):
 
 
 MIN_SPEED = 0.05  # m/s; below it a robot would not reach the end of its path
+AT_END = 0.05  # m; nearer to the goal a robot only turns to its heading, unless the goal's tolerance is less
 SHORTEST_CHECK = 0.05  # s
 
 
@@ -73,6 +75,7 @@ class FollowPath(MapPlugin, AbstractController):
 
     _tracker: PathTracker | None = None
     _room_to_turn = RoomToTurn()
+    _turn_at_goal = TurnAtGoal(AT_END)
 
     @property
     def turns_on_the_spot(self) -> bool:
@@ -82,6 +85,7 @@ class FollowPath(MapPlugin, AbstractController):
     def set_plan(self, path: Path) -> bool:
         """Take over a path that has poses."""
         self._tracker, self._room_to_turn = PathTracker(path, dimensions=2) if len(path) else None, RoomToTurn()
+        self._turn_at_goal = TurnAtGoal(AT_END)
         return self._tracker is not None
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
@@ -90,12 +94,17 @@ class FollowPath(MapPlugin, AbstractController):
         if tracker is None:
             return no_path()
         tracker.update((pose.x, pose.y))
+        self._update_end(pose, tracker)
         factor = self.relaxation.slack(self.clock.now()).controller_factor
         if missed := missed_path(tracker, p.max_path_distance * factor):
             return missed
 
         def blocked(motion: Twist) -> str:
-            return self.navigation_map.obstacle_ahead(there, motion, self._time_checked(motion, pose, tracker))
+            asked = there, motion, self._time_checked(motion, pose, tracker)
+            obstacle = self.navigation_map.obstacle_ahead(*asked)
+            if obstacle and self._stays_on_map(pose, tracker):
+                return self.navigation_map.obstacle_on_path(*asked)
+            return obstacle
 
         try:
             there = self.on_map(pose)
@@ -118,6 +127,7 @@ class FollowPath(MapPlugin, AbstractController):
         tracker = self._tracker
         if tracker is None:
             return False
+        self._turn_at_goal.take_tolerances(dist_tolerance, angle_tolerance)
         tracker.update((pose.x, pose.y))
         gap, turn = self._from_goal(pose, tracker)
         return tracker.has_arrived(dist_tolerance) and gap <= dist_tolerance and abs(turn) <= angle_tolerance
@@ -130,7 +140,7 @@ class FollowPath(MapPlugin, AbstractController):
         p = self.parameters
         backward = self._backward(tracker)
         gap, turn = self._from_goal(pose, tracker)
-        if self._is_at_end(pose, tracker):
+        if self._turn_at_goal.is_turning:
             return [self._turn(turn)]
         bearing, curvature = self._carrot(pose, tracker)
         error = off_course(bearing, backward)
@@ -161,14 +171,24 @@ class FollowPath(MapPlugin, AbstractController):
         error = self._angle_left(pose, tracker)
         return [*along_path(tracker, pose, backward), *([self._turn(error)] if abs(error) > SMALL_TURN else [])]
 
-    def _is_at_end(self, pose: Pose, tracker: PathTracker) -> bool:
-        """Whether nothing is left but to turn to the goal's heading."""
-        near = tracker.remaining < 0.5 * MIN_SPEED and self._from_goal(pose, tracker)[0] < MIN_SPEED
-        return tracker.on_last_section and near
+    def _stays_on_map(self, pose: Pose, tracker: PathTracker) -> bool:
+        """Whether the path does not leave the map as far ahead as it is looked at."""
+        check, ahead = self.navigation_map.point_check(), self.parameters.look_ahead_dist
+        for x, y, _ in poses_ahead(tracker, ahead, self._backward(tracker)).tolist():
+            place = Pose.planar(x, y, 0.0, pose.z, pose.frame_id, pose.stamp)
+            if check(self.on_map(place)).state is CellState.OUTSIDE:
+                return False
+        return True
+
+    def _update_end(self, pose: Pose, tracker: PathTracker) -> None:
+        """Decide whether nothing is left but to turn to the goal's heading."""
+        gap, turn = self._from_goal(pose, tracker)
+        driven = tracker.on_last_section and tracker.remaining < 0.5 * AT_END
+        self._turn_at_goal.update(driven and gap < self._turn_at_goal.limit, turn)
 
     def _angle_left(self, pose: Pose, tracker: PathTracker) -> float:
         """Angle [rad] to the goal's heading at the end of the path, else to the point ahead on it."""
-        if self._is_at_end(pose, tracker):
+        if self._turn_at_goal.is_turning:
             return self._from_goal(pose, tracker)[1]
         return off_course(self._carrot(pose, tracker)[0], self._backward(tracker))
 

@@ -131,8 +131,8 @@ def polygon_costs(cells: NDArray[np.uint8], corners: FloatArray) -> tuple[int, i
 
 
 @kernel
-def blocked_under(cells: NDArray[np.uint8], corners: FloatArray) -> tuple[int, int]:
-    """How many of the cells a polygon covers are lethal (254) or off the grid, and how many it covers at all."""
+def blocked_under(cells: NDArray[np.uint8], corners: FloatArray, off_grid: bool) -> tuple[int, int]:
+    """How many of the cells a polygon covers are lethal (254), or off the grid if asked for, and how many it covers."""
     height, width = cells.shape
     x0, y0, mask = rasterise_polygon(corners, (-(1 << 40), -(1 << 40), 1 << 40, 1 << 40))
     blocked, covered = 0, 0
@@ -142,7 +142,9 @@ def blocked_under(cells: NDArray[np.uint8], corners: FloatArray) -> tuple[int, i
                 continue
             ix, iy = x0 + column, y0 + row
             covered += 1
-            if ix < 0 or iy < 0 or ix >= width or iy >= height or cells[iy, ix] == 254:
+            if ix < 0 or iy < 0 or ix >= width or iy >= height:
+                blocked += off_grid
+            elif cells[iy, ix] == 254:
                 blocked += 1
     return blocked, covered
 

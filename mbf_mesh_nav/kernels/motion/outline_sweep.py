@@ -29,11 +29,13 @@ def touching(
     point: Vector,
     course: Vector,
     outline: FloatArray,
+    border: bool,
     touches: Flags,
 ) -> Vector:
     """Note which points (n, 2: bearing off the course [rad], distance [m]) of an outline are on lethal ground or off.
 
-    Ground is lethal where the nearest corner of its face is. Writes ``touches`` (n,); returns the last such point.
+    Off the surface counts if ``border``. Ground is lethal where the nearest corner of its face is. Writes ``touches``
+    (n,); returns the last such point.
     """
     normal, last = row(face_normals, face), point
     for n in range(len(outline)):
@@ -41,13 +43,14 @@ def touching(
         at_face, at, _, walked = walk(
             vertices, faces, face_neighbours, face_normals, face, point, direction, outline[n, 1]
         )
+        is_off = walked < outline[n, 1] - ROUNDING
         nearest, rank = np.inf, np.float32(0.0)
         for side in range(3):
             off = difference(at, row(vertices, faces[at_face, side]))
             square = dot(off, off)
             if square < nearest:
                 nearest, rank = square, ranks[faces[at_face, side]]
-        touches[n] = walked < outline[n, 1] - ROUNDING or rank >= LETHAL_RANK
+        touches[n] = (border and is_off) or rank >= LETHAL_RANK
         if touches[n]:
             last = at
     return last
@@ -64,6 +67,7 @@ def sweep(
     stride: float,
     turn: float,
     steps: int,
+    border: bool,
 ) -> tuple[bool, Vector]:
     """Whether more of an outline touches lethal ground, or the border, in the course of a turn than before it.
 
@@ -77,6 +81,8 @@ def sweep(
         Bearing [rad] off the course and distance [m] of points on it.
     stride, turn : float
         Length [m] and turn [rad] of one step.
+    border : bool
+        Whether a point past the border touches it.
 
     Returns
     -------
@@ -87,13 +93,14 @@ def sweep(
     vertices, faces = surface.vertices, surface.faces
     face_neighbours, face_normals = surface.face_neighbours, surface.face_normals
     touches = np.empty(len(outline), dtype=np.bool_)
-    touching(vertices, faces, face_neighbours, face_normals, ranks, face, point, course, outline, touches)
+    how = outline, border, touches
+    touching(vertices, faces, face_neighbours, face_normals, ranks, face, point, course, *how)
     before = touches.sum()
     for _ in range(steps):
         if stride > 0.0:
             face, point, course, _ = walk(vertices, faces, face_neighbours, face_normals, face, point, course, stride)
         course = turned(course, row(face_normals, face), turn)
-        place = touching(vertices, faces, face_neighbours, face_normals, ranks, face, point, course, outline, touches)
+        place = touching(vertices, faces, face_neighbours, face_normals, ranks, face, point, course, *how)
         if touches.sum() > before:
             return True, place
     return False, point

@@ -135,6 +135,11 @@ class TileQuestions(OutlinedMap):
         there = self._around_motion(pose, command, duration)
         return there if isinstance(there, str) else there.obstacle_on_track(pose, command, duration)
 
+    def obstacle_on_path(self, pose: Pose, command: Twist, duration: float) -> str:
+        """As ``obstacle_ahead``, where the robot may reach over a border."""
+        there = self._around_motion(pose, command, duration)
+        return there if isinstance(there, str) else there.obstacle_on_path(pose, command, duration)
+
     def _around_motion(self, pose: Pose, command: Twist, duration: float) -> MeshMap | str:
         """The part of the map a motion needs, or why there is none."""
         radius = OF_ROBOTS + command.speed * duration + self.robot_reach

@@ -125,7 +125,11 @@ def test_blocked_cells_are_the_lethal_ones_of_a_map_in_a_lethal_frame(cells, x, 
     framed[10:16, 10:17] = cells
     polygon = np.array([(x - 1.25, y - 1.0), (x + 1.875, y), (x, y + 1.75)])
     covered, lethal, *_ = polygon_costs(framed, polygon + 10.0)
-    assert blocked_under(cells, polygon) == (lethal, covered)
+    assert blocked_under(cells, polygon, True) == (lethal, covered)
+    framed[framed == 254] = 0
+    framed[10:16, 10:17] = cells
+    _, lethal, *_ = polygon_costs(framed, polygon + 10.0)
+    assert blocked_under(cells, polygon, False) == (lethal, covered), "off the grid is free unless asked for"
 
 
 def test_the_summary_of_a_polygon_off_the_map_is_outside():

@@ -90,6 +90,17 @@ def test_where_planners_and_controllers_see_no_collision_a_motion_is_free():
     assert refused > 0 and clipped > 0  # by less than a quarter of a cell, which counts for none of them
 
 
+def test_on_a_path_the_footprint_may_reach_over_the_border_and_the_base_may_not():
+    costmap, wall = points_at(), points_at((1.95, 0.0))
+    there, forward = Pose.planar(1.3, 0.0), Twist.planar(0.5)
+    assert obstacle_ahead(costmap, SQUARE, there, forward, 1.0) != ""
+    assert obstacle_ahead(costmap, SQUARE, there, forward, 1.0, may_overhang=True) == ""
+    assert obstacle_ahead(wall, SQUARE, there, forward, 1.0, may_overhang=True) != "", "what stands there counts"
+    assert "(2.0" in obstacle_ahead(costmap, SQUARE, there, forward, 1.5, may_overhang=True), "the base would leave"
+    outside = Pose.planar(2.1, 0.0, math.pi)
+    assert obstacle_ahead(costmap, SQUARE, outside, forward, 1.0, may_overhang=True) == "", "it may come back"
+
+
 # ------------------------------------------------------------------------------------------------ velocity smoother
 @pytest.mark.parametrize(
     ("controller_class", "more"),

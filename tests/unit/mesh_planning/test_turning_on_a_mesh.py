@@ -47,6 +47,17 @@ def test_no_corner_is_turned_over_the_border(beside_a_wall):
     assert "would touch it" in beside_a_wall.obstacle_ahead(Pose.planar(0.4, 1.5, 0.5 * math.pi), TURN, 0.6)
 
 
+def test_on_a_path_corners_may_be_turned_over_a_free_border_but_not_over_a_lethal_one(paint):
+    here = Pose.planar(0.4, 1.5, 0.5 * math.pi)
+    for cost, refused in ((0.0, False), (np.inf, True)):
+        rim = paint(
+            MeshMap.from_heights(np.zeros((61, 61)), EDGE, EDGE), lambda v, c=cost: np.where(v[:, 0] < 0.05, c, 0)
+        )
+        rim.inscribed_radius, rim.footprint = 0.35, LONG
+        assert "would touch it" in rim.obstacle_ahead(here, TURN, 0.6)
+        assert bool(rim.obstacle_on_path(here, TURN, 0.6)) == refused
+
+
 @given(
     st.floats(1.0, 5.0),
     st.floats(1.0, 5.0),

@@ -175,6 +175,7 @@ def test_a_robot_off_the_surface_gets_the_answers_of_the_whole_mesh(tiled, whole
     place = whole_hills.free_places(1, 15)[0]
     for there in (*(pose(place + np.array([0.0, 0.0, up])) for up in (0.8, 5.0)), Pose.planar(-300.0, 0.0)):
         assert tiled.obstacle_ahead(there, forward, 1.0) == whole.obstacle_ahead(there, forward, 1.0)
+        assert tiled.obstacle_on_path(there, forward, 1.0) == whole.obstacle_on_path(there, forward, 1.0)
         assert tiled.nearest_obstacle(there, 9.0) == pytest.approx(whole.nearest_obstacle(there, 9.0))
 
 

@@ -1,0 +1,23 @@
+"""A robot at its goal turns to the heading, whatever its pose does by some centimetres, and does not stand off it."""
+
+from mbf_abstract.maps.controllers.turn_at_goal import PATIENCE, TurnAtGoal
+
+
+def turning(gaps, angle, reach=0.08, tolerances=(0.1, 0.2)):
+    """What is decided for each gap [m]."""
+    state = TurnAtGoal(reach)
+    state.take_tolerances(*tolerances)
+    return [state.update(gap <= state.limit, angle) for gap in gaps]
+
+
+def test_a_robot_that_turns_may_drift_twice_as_far_before_it_drives_again():
+    assert turning([0.09, 0.07, 0.09, 0.15, 0.17, 0.15, 0.08], 1.0) == [False, True, True, True, False, False, True]
+
+
+def test_it_begins_no_farther_off_than_the_goal_allows():
+    assert turning([0.07, 0.05, 0.07], 1.0, tolerances=(0.05, 0.2)) == [False, True, True]
+
+
+def test_one_that_has_the_heading_but_drifted_out_of_the_tolerance_drives_again():
+    decided = turning([0.08] + [0.12] * (PATIENCE + 5), 0.1)
+    assert decided == [True] * PATIENCE + [False] * 6
