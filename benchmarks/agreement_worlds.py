@@ -206,7 +206,9 @@ class MeshWorld(World):
         common = self.map.topology, self.map.locator
         walls = PaintedLayer(LayerContext("walls", *common, PaintedLayer.Parameters()))
         walls.boxes = boxes
-        inflation = InflationLayer.Parameters(inscribed_radius=RADIUS, inflation_radius=0.6)
+        # As on all shipped maps: with the default 0.99 planners may cross places where the disc does not fit.
+        closed = {"lethal_value": np.inf, "inscribed_value": 1.0}
+        inflation = InflationLayer.Parameters(inscribed_radius=RADIUS, inflation_radius=0.6, **closed)
         shown = InflationLayer(LayerContext("inflation", *common, inflation, (walls,)))
         for layer in (walls, shown):
             layer.recompute()

@@ -137,8 +137,8 @@ class NavigationMap(ABC):
     def obstacle_on_path(self, pose: Pose, command: Twist, duration: float) -> str:
         """As ``obstacle_ahead``, for a robot that follows a path which stays on the map.
 
-        The end of the map is an obstacle for the robot's centre only, as it is for planners: beside a free end of the
-        map they allow an outline to reach over it.
+        It asks for no more than planners do: beside a free end of the map they let an outline reach over it, and where
+        a map knows no outline only the robot's centre has to keep off ground that costs too much.
         """
         return self.obstacle_ahead(pose, command, duration)
 

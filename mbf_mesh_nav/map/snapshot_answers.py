@@ -92,7 +92,7 @@ class SnapshotAnswers(OutlinedMap):
         return self._obstacle(pose, command, duration, np.inf)
 
     def obstacle_on_path(self, pose: Pose, command: Twist, duration: float) -> str:
-        """As ``obstacle_ahead``, where the robot may reach over a border with all but its centre."""
+        """As ``obstacle_ahead``; its centre apart the robot may reach over a border and what costs too much."""
         return self._obstacle(pose, command, duration, FORBIDDEN_COST, may_overhang=True)
 
     def _obstacle(

@@ -2,8 +2,8 @@
 
 The robot's centre is walked over the surface along the arc of its command, and on by its radius in the direction it
 then has. Forbidden surface ends the motion, and so does a border; a robot that stands on forbidden
-surface may leave it, see ``kernels.search.forbidden_surface``. A robot that follows a path may reach over a border with
-all but its centre. What its sides would touch is in the costs: on a map
+surface may leave it, see ``kernels.search.forbidden_surface``. A robot that follows a path is asked for less, see
+``forbidden_ahead``. What its sides would touch is in the costs: on a map
 that is not inflated only what lies straight ahead counts. What turns on the spot is checked in ``turning``, too.
 """
 
@@ -40,7 +40,7 @@ def forbidden_ahead(
     command: Twist,
     duration: float,
     radius: float,
-    overhangs: SurfaceLocator | None = None,
+    surface: SurfaceLocator | None = None,
 ) -> str:
     """Where the motion would lead onto forbidden surface or past a border, as a text; empty if it is free.
 
@@ -54,8 +54,9 @@ def forbidden_ahead(
         Kept for ``duration`` [s].
     radius : float
         How far [m] the robot reaches beyond its centre.
-    overhangs : SurfaceLocator, optional
-        Of the surface, if the robot may reach over a border as long as its centre stays on the surface.
+    surface : SurfaceLocator, optional
+        Of a robot that follows a path. Only its centre may not leave the surface, nor come onto what costs too much, as
+        planners ask for no more; beyond its centre it may touch all but lethal ground.
     """
     face, point = place.face, vector_of(place.point)
     stands_on = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
@@ -71,18 +72,26 @@ def forbidden_ahead(
             mesh.vertices, mesh.faces, mesh.face_neighbours, mesh.face_normals, face, point, direction, stride
         )
         ends = done < stride - 1e-6
-        if ends and overhangs is None:
+        if ends and surface is None:
             return f"the surface ends at {position_text(point)}"
         comes_to = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
-        if not may_enter(stands_on, comes_to):
+        reaches_over = surface is not None and walked >= on_arc and not _is_lethal(mesh, ranks, face, point)
+        if not (may_enter(stands_on, comes_to) or reaches_over):
             return obstacle_text(position_text(point))
-        if ends:
+        if ends and surface is not None:
             past = on_arc - walked - done
-            return _past_border(mesh, overhangs, face, point, direction, past, command.wz / command.speed)
+            return _past_border(mesh, surface, face, point, direction, past, command.wz / command.speed)
         stands_on, walked = comes_to, walked + stride
         if command.wz != 0.0 and walked < on_arc:
             direction = turned(direction, vector_of(mesh.face_normals[face]), command.wz * stride / command.speed)
     return ""
+
+
+def _is_lethal(mesh: MeshTopology, ranks: Float32Array, face: int, point: Vector) -> bool:
+    """Whether the corner of a face that is nearest to a point in it is lethal."""
+    corners = mesh.faces[face]
+    nearest = corners[int(np.argmin(norm(mesh.vertices[corners] - np.array(point))))]
+    return bool(ranks[nearest] >= LETHAL_RANK)
 
 
 def _past_border(

@@ -26,8 +26,11 @@ REFUSED = (
     ("straight_line", "follow_path", 20), ("theta_star", "follow_path", 20), ("astar", "follow_path", 23),
 )  # fmt: skip
 """Drives on the costmap that were refused twice at one place."""
-ALONG_THE_END = (("costmap", "astar", 8, True), ("costmap", "theta_star", 8, True), ("mesh", "dijkstra", 300, False))
-"""Planners whose paths lead along a free end of the map; whether no walls stand around."""
+AT_LIMITS = (
+    ("costmap", "astar", 8, True), ("costmap", "theta_star", 8, True), ("mesh", "dijkstra", 84, True),
+    ("mesh", "dijkstra", 65, True), ("mesh", "dijkstra", 84, False), ("mesh", "dijkstra", 104, True),
+)  # fmt: skip
+"""Paths along a free end of the map, or towards a wall to a goal beside it; whether no walls stand around."""
 FOLLOWERS = {"regulated_pure_pursuit", "follow_path", "path_follower"}
 """Controllers that keep to their path; those that sample motions may leave it, and are only counted."""
 
@@ -66,8 +69,8 @@ def test_no_plan_is_refused_twice_on_a_map_that_does_not_change(backend, planner
     assert verdict.agrees, verdict
 
 
-@pytest.mark.parametrize(("backend", "planner", "seed", "is_open"), ALONG_THE_END)
-def test_a_plan_along_a_free_end_of_the_map_is_driven(backend, planner, seed, is_open):
+@pytest.mark.parametrize(("backend", "planner", "seed", "is_open"), AT_LIMITS)
+def test_a_plan_along_the_end_of_the_map_or_to_beside_a_wall_is_driven(backend, planner, seed, is_open):
     world = agreement.WORLDS[backend](seed, is_open)
     made = world.plugin(PluginKind.PLANNER, planner), world.plugin(PluginKind.CONTROLLER, "follow_path")
     verdict = agreement.drive(world, *made)

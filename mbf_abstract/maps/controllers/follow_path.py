@@ -155,11 +155,21 @@ class FollowPath(MapPlugin, AbstractController):
 
     def _time_checked(self, motion: Twist, pose: Pose, tracker: PathTracker) -> float:
         """How long [s] a motion must be free: until it ends at a cusp or has turned far enough, at most as set."""
-        left, speed = tracker.to_cusp, abs(motion.vx)
+        left, speed = min(tracker.to_cusp, self._arc_to_goal(pose, tracker)), abs(motion.vx)
         if motion.vx == 0.0:
             left, speed = abs(self._angle_left(pose, tracker)), abs(motion.wz)
         longest = self.parameters.check_ahead_time
         return max(min(longest, left / speed), SHORTEST_CHECK) if speed > 0.0 else longest
+
+    def _arc_to_goal(self, pose: Pose, tracker: PathTracker) -> float:
+        """Length [m] of the arc to the goal where that is the point ahead; it cuts what the path still goes around."""
+        if not tracker.on_last_section or tracker.remaining > self.parameters.look_ahead_dist:
+            return math.inf
+        angle = abs(off_course(self._carrot(pose, tracker)[0], self._backward(tracker)))
+        if angle >= 0.5 * math.pi:
+            return math.inf
+        gap = self._from_goal(pose, tracker)[0]
+        return gap * angle / math.sin(angle) if angle > 0.0 else gap
 
     def _along_path(self, pose: Pose, tracker: PathTracker, reach: float) -> list[Twist]:
         """Motions that keep to the path, if the outline fits on it over ``reach`` [m]."""

@@ -41,6 +41,14 @@ def test_a_lethal_border_is_an_obstacle_for_the_outline(plain, paint):
     assert "would touch it" in plain.obstacle_on_path(there, FORWARD, 1.0)
 
 
+def test_a_path_leads_as_near_to_a_wall_as_its_inflation_lets_the_centre(plain, paint):
+    paint(plain, lambda v: np.where(v[:, 1] > 5.05, np.inf, np.where(v[:, 1] > 4.85, 1.0, 0.0)))
+    there, near = Pose.planar(3.0, 4.2, 0.5 * math.pi), Pose.planar(3.0, 4.6, 0.5 * math.pi)
+    assert "would touch it" in plain.obstacle_ahead(there, FORWARD, 1.0), "the inflation, a radius ahead"
+    assert plain.obstacle_on_path(there, FORWARD, 1.0) == ""
+    assert "would touch it" in plain.obstacle_on_path(near, FORWARD, 1.0), "its centre may not come onto it"
+
+
 def test_on_a_slope_the_border_is_where_it_is_on_level_ground():
     slope = MeshMap.from_heights(np.tile(0.5 * EDGE * np.arange(61)[:, None], (1, 61)), EDGE, EDGE)
     slope.inscribed_radius = 0.25
