@@ -1,17 +1,19 @@
 """Full circle: a cloud of a known world, the map built from it, a plan on the built map, the drive in the true world.
 
     python benchmarks/maps.py [--quick] [--json] [--workers 2] [--terrains 40] [--buildings 10] [--sizes 1,10]
-                              [--levels 0,1,2] [--seed 7000] [--maps true,built,posed,coarse]
+                              [--levels 0,1,2] [--seed 7000] [--maps true,built,posed,coarse] [--log FILE]
 
 Terrains are those of ``mbf bench outdoor`` of every level, with posts, on seeds that nothing was chosen on. Their
 clouds have 100 points on a square metre with noise of 2 cm, crowns above the posts, and grass of 10 cm on a fifth of
 the ground. Buildings are the shipped bridge and garage, scanned on all sides with the same density and noise. Each is
-driven once on the built map and once on the true one, of which the faces below the posts are cut out. ``--maps`` adds
-worse ones of the terrains: ``posed`` is built from scans whose poses are wrong (5 cm along each axis and 2 degrees of
+driven once on the built map and once on the true one, of which the faces below the posts are cut out. Terrains are
+driven with the shipped ``outdoor_mesh.yaml``, whose fallback planner ``mbf bench`` leaves out. ``--maps`` adds worse
+ones of the terrains: ``posed`` is built from scans whose poses are wrong (5 cm along each axis and 2 degrees of
 heading, half of it drift that lasts for some twenty scans; a robot knows its roll and pitch from gravity), ``coarse``
 is the built one with a quarter of the vertices and heights that are wrong by up to 3 cm. Rates are over the terrains
-with a route (by the judge of ``mbf bench``, posts included). ``--sizes`` are millions of points, each
-built in a process of its own; CPU time and peak memory are of that process.
+with a route (by the judge of ``mbf bench``, posts included). ``--log`` takes each finished terrain or building, and
+a run with the same options goes on behind them. ``--sizes`` are millions of points, each built in a process of its own;
+CPU time and peak memory are of that process.
 """
 
 from __future__ import annotations
@@ -45,6 +47,7 @@ from terrain.experiments.evaluation.outdoor import FROM_CORNER, LEVELS, SIZE, ge
 from terrain.experiments.evaluation.reachability import is_reachable
 from terrain.physics.robot_models import HUSKY
 from terrain.scenarios.environment import FOREST_STREAM, WORLD_STREAM
+from terrain.scenarios.library import LIBRARY
 from terrain.scenarios.obstacles import Forest, Obstacle
 from terrain.scenarios.places import coordinates
 from terrain.scenarios.scenario import Scenario, load_scenario
@@ -64,7 +67,17 @@ COARSE_SHARE, COARSE_HEIGHTS = 0.25, 0.03
 KINDS = ("true", "built", "posed", "coarse")
 POSTS = Forest(x_range=(2.0, SIZE[0] - 2.0), y_range=(2.0, SIZE[1] - 2.0), count=12, gap=2.4, diameter=0.3, height=1.5)
 MAP_FILE = "mesh_map.mesh_file"
+NAVIGATION = {"mesh": LIBRARY / "config" / "outdoor_mesh.yaml"}
 Row = dict[str, Any]
+
+
+class World(NamedTuple):
+    """A terrain by its level and seed with the maps of it, or a building by its number."""
+
+    level: int
+    seed: int
+    kinds: tuple[str, ...]
+    building: int = -1
 
 
 class BuiltMap(NamedTuple):
@@ -144,7 +157,8 @@ def coarser(built: BuiltMap, rng: np.random.Generator) -> BuiltMap:
 
 def terrain_row(level: int, seed: int, folder: Path, kinds: Sequence[str] = KINDS[:2]) -> tuple[Scenario, Row]:
     """Build the maps of one terrain with posts; the scenario, and how the built one compares with the truth."""
-    scenario = generated(level).model_copy(update={"forests": (POSTS,), "limits": load_scenario("post_forest").limits})
+    chosen = {"forests": (POSTS,), "limits": load_scenario("post_forest").limits, "navigation": NAVIGATION}
+    scenario = generated(level).model_copy(update=chosen)
     clear = coordinates((scenario.start, *scenario.goals))
     ground = scenario.world.heightfield(np.random.default_rng([seed, WORLD_STREAM]), clear)  # type: ignore[union-attr]
     posts = POSTS.posts(np.random.default_rng([seed, FOREST_STREAM]), clear)
@@ -233,21 +247,38 @@ def write_maps(folder: Path, name: str, maps: Mapping[str, BuiltMap]) -> dict[st
     return files
 
 
-def drive(chosen: list[tuple[Scenario, Row]], workers: int) -> list[Row]:
-    """Drive each on the built and on the true map; one row each."""
-    jobs, about = [], {}
-    for scenario, row in chosen:
-        for kind, file in row["maps"].items():
-            run = SweepRun(row["seed"], {MAP_FILE: file} if file else {})
-            jobs.append((scenario, run))
-            about[scenario.name, row["seed"], file] = {**row, "map": kind}
+def drives(world: World) -> list[Row]:
+    """Build the maps of a world and drive it once on each; one row each."""
     rows = []
-    for (scenario, run), metrics in run_in_workers(run_once, jobs, workers):
-        row = about[scenario.name, run.seed, run.settings.get(MAP_FILE, "")]
-        row = {**row, "arrived": metrics["success"], "incidents": sorted(metrics.get("incidents", {}))}
-        rows.append({**row, "outcome": metrics["outcome"], "message": metrics["message"]})
-        answer = (row["world"], row["seed"], row["map"], "route" if row["route"] else "no route", metrics["outcome"])
-        print(" | ".join(map(str, (*answer, ",".join(row["incidents"]), metrics["message"]))), flush=True)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        if world.building >= 0:
+            scenario, row = building_row(world.building, folder)
+        else:
+            scenario, row = terrain_row(world.level, world.seed, folder, world.kinds)
+        for kind, file in row.pop("maps").items():
+            metrics = run_once((scenario, SweepRun(row["seed"], {MAP_FILE: file} if file else {})))
+            answer = {"arrived": metrics["success"], "incidents": sorted(metrics.get("incidents", {}))}
+            rows.append({**row, "map": kind, **answer, "outcome": metrics["outcome"], "message": metrics["message"]})
+    return rows
+
+
+def drive(worlds: Sequence[World], workers: int, log: Path | None) -> list[Row]:
+    """Rows of all worlds; those in the log are not driven again."""
+    lines = log.read_text().splitlines() if log is not None and log.is_file() else []
+    known = {
+        World(**{**line["world"], "kinds": tuple(line["world"]["kinds"])}): line["rows"]
+        for line in map(json.loads, lines)
+    }
+    rows = [row for world in worlds for row in known.get(world, ())]
+    for world, found in run_in_workers(drives, [world for world in worlds if world not in known], workers):
+        rows += found
+        if log is not None:
+            with log.open("a") as stream:
+                stream.write(json.dumps({"world": world._asdict(), "rows": found}) + "\n")
+        for row in found:
+            answer = (row["world"], row["seed"], row["map"], "route" if row["route"] else "no route", row["outcome"])
+            print(" | ".join(map(str, (*answer, ",".join(row["incidents"]), row["message"]))), flush=True)
     return rows
 
 
@@ -297,6 +328,7 @@ def main() -> None:
     parser.add_argument("--levels", default=",".join(map(str, range(LEVELS))), help="of the terrains")
     parser.add_argument("--seed", type=int, default=FIRST_SEED, help="of the first terrain of each level")
     parser.add_argument("--maps", default="true,built", help=f"of the terrains, some of {', '.join(KINDS)}")
+    parser.add_argument("--log", type=Path, help="file that keeps each finished world, one JSON object a line")
     parser.add_argument("--one-size", type=float, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one_size:
@@ -312,15 +344,10 @@ def main() -> None:
         answer = subprocess.run(command, check=True, capture_output=True, text=True).stdout
         figures["sizes"].append(json.loads(answer.splitlines()[-1]))
         print(figures["sizes"][-1], flush=True)
-    with tempfile.TemporaryDirectory() as folder:
-        chosen = [
-            terrain_row(levels[n % len(levels)], arguments.seed + n // len(levels), Path(folder), kinds)
-            for n in range(terrains)
-        ]
-        figures["terrains"] = summarise(drive(chosen, arguments.workers))
-        figures["buildings"] = summarise(
-            drive([building_row(n, Path(folder)) for n in range(buildings)], arguments.workers)
-        )
+    grounds = [World(levels[n % len(levels)], arguments.seed + n // len(levels), tuple(kinds)) for n in range(terrains)]
+    figures["terrains"] = summarise(drive(grounds, arguments.workers, arguments.log))
+    sites = [World(0, 0, (), n) for n in range(buildings)]
+    figures["buildings"] = summarise(drive(sites, arguments.workers, arguments.log))
     for name, line in figures.items():
         print(f"{name:10} {line}")
     if arguments.json:
