@@ -154,7 +154,10 @@ class _Describer:
         limits = self._limits("velocity", [self.urdf.joints[wheel.joint].velocity for wheel in self.gear.driven])
         if limits and radius > 0.0:
             return min(limits) * radius
-        self.notes.append(f"max_speed: {USUAL_SPEED:g} m/s is assumed, because the wheels have no limit of velocity")
+        cause = (
+            "the wheels have no limit of velocity" if self.gear.wheels else "joints do not say how fast legs carry it"
+        )
+        self.notes.append(f"max_speed: {USUAL_SPEED:g} m/s is assumed, because {cause}")
         return USUAL_SPEED
 
     def _limits(self, name: str, values: list[float | None]) -> list[float]:

@@ -61,8 +61,10 @@ def given_system(text: str) -> str:
     name, is_degrees, is_geocentric = "", False, GEOCENTRIC_FORM.match(given) is not None
     if match := CODE.fullmatch(given):
         codes = [int(code) for code in match.groups() if code]
-        if all(LEAST_CODE <= code <= GREATEST_CODE for code in codes):
-            name = f"EPSG:{'+'.join(map(str, codes))}"
+        if not all(LEAST_CODE <= code <= GREATEST_CODE for code in codes):
+            text = f"crs: EPSG gives codes from {LEAST_CODE} to {GREATEST_CODE}, got {given!r:.60}"
+            raise MeshError("point cloud", [text])
+        name = f"EPSG:{'+'.join(map(str, codes))}"
     elif WELL_KNOWN_TEXT.fullmatch(given) and given.count("[") == given.count("]"):
         name, is_degrees = name_of_text(given), DEGREES_OF_TEXT.match(given) is not None
     elif len(given) <= LONGEST_NAME and given.isascii() and given.isprintable() and PROJ_STRING.fullmatch(given):

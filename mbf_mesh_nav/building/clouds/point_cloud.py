@@ -246,6 +246,8 @@ def _refuse_units(files: Sequence[Path], parts: Sequence[FloatArray], is_stated:
     upper = np.max([part.max(axis=0) for part in parts], axis=0)
     length, height = float(max(upper[:2] - lower[:2])), float(upper[2] - lower[2])
     size = f"{upper[0] - lower[0]:.6g} x {upper[1] - lower[1]:.6g} x {height:.6g} m"
+    if sum(map(len, parts)) == 1:
+        raise MeshError(str(files[0]), ["there is a single point in it, of which no map can be made"])
     if length == 0.0:
         raise MeshError(str(files[0]), ["all of its points lie at one place in the plan view"])
     if is_degrees(lower, upper) and height > 10.0 * length:

@@ -241,6 +241,7 @@ def test_coordinates_that_four_bytes_cannot_hold_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("points", "text"),
     [
+        (POINTS[:1], "there is a single point in it, of which no map can be made"),
         (POINTS * 1e4, "its unit is hardly the metre. Give the unit, e.g. --scale 0.001 for millimetres"),
         (POINTS * [0.0, 0.0, 1.0], "all of its points lie at one place in the plan view"),
         (POINTS * 0.001, "too small for a map. If its unit is not the metre, give it with --scale"),
@@ -365,12 +366,18 @@ def test_a_given_coordinate_system_is_kept_by_its_code_or_name(given, kept):
 
 @pytest.mark.parametrize(
     "given",
-    ["banana", "25832", "EPSG:abc", "EPSG:99999999", "EPSG:12", 'PROJCS["x', "+proj=", "+zone=32", "two\nlines"],
+    ["banana", "25832", "EPSG:abc", 'PROJCS["x', "+proj=", "+zone=32", "two\nlines"],
 )
 def test_what_is_no_coordinate_system_is_refused_before_a_file_is_read(tmp_path, given):
     text = refusal(tmp_path / "none.las", crs=given)
     assert text.startswith("point cloud: crs: expected a code such as EPSG:25832, well-known text or a PROJ string")
     assert text.endswith(f"got {given!r}")
+
+
+@pytest.mark.parametrize("given", ["EPSG:99999999", "EPSG:12", "EPSG:25832+1", "urn:ogc:def:crs:EPSG::40000"])
+def test_a_code_that_epsg_does_not_give_is_refused_as_one(tmp_path, given):
+    text = refusal(tmp_path / "none.las", crs=given)
+    assert text == f"point cloud: crs: EPSG gives codes from 1024 to 32766, got {given!r}"
 
 
 @pytest.mark.parametrize(

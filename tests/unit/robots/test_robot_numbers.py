@@ -209,6 +209,7 @@ def test_a_racecar_of_others_is_a_car_though_one_hinge_is_called_continuous():
 def test_robots_without_wheels_and_many_joints_are_on_legs(name):
     found = describe(package_file(name))
     assert found.drive == "legged"
+    assert "max_speed: 1 m/s is assumed, because joints do not say how fast legs carry it" in found.notes
     assert 0.1 < footprint_radii(found.footprint)[0] < footprint_radii(found.footprint)[1] < 0.7
 
 
