@@ -85,6 +85,10 @@ class LayeredMap(NavigationMap):
         """
         self.insert_scan(RangeScan.of_points(source, points, sensor_origin, stamp, self.frame_id))
 
+    def stale_reason(self, now: float) -> str:
+        """Why the map is not current at ``now`` [s]: a layer that raised, or a silent sensor; empty if it is."""
+        return self.layers.stale_reason(now)
+
     def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
         """The objects of all layers that follow some, at ``now`` [s]."""
         with self._lock:

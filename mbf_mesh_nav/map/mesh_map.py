@@ -250,12 +250,6 @@ class MeshMap(SnapshotAnswers):
             self.set_edge_cost_factor(parameters.edge_cost_factor)
         self.inscribed_radius, self.footprint = parameters.inscribed_radius, parameters.footprint
 
-    def stale_reason(self, now: float) -> str:
-        """Why the map is not current at ``now`` [s]: a layer that raised, or a silent sensor; empty if it is."""
-        if self.layers.problem:
-            return f"the mesh map is not up to date: {self.layers.problem}"
-        return self.layers.stale_reason(now)
-
     def apply(self, event: Callable[[MeshLayer], IntArray]) -> None:
         """Give an event to every layer, see ``LayerGraph.apply``, and show plugins the map that follows."""
         with self._lock:

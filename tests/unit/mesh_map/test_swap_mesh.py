@@ -157,7 +157,7 @@ def test_no_controller_drives_on_a_map_whose_layers_did_not_come_through(navigat
 
     with pytest.raises(RuntimeError):
         server.mesh_map.apply(raises)
-    assert server.map_problem() == "the mesh map is not up to date: layer 'slopes' raised RuntimeError: no idea"
+    assert server.map_problem() == "layer 'slopes' raised RuntimeError: no idea"
     assert server.mesh_map.stale_reason(0.0)
 
     server.mesh_map.clear()
