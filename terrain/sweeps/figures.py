@@ -13,6 +13,7 @@ from mbf_abstract.whole_files import write_whole
 from terrain.sweeps.statistics import METRICS, Row, values_of
 
 TRACK = "track"
+LEAST_HEIGHT, MOST_HEIGHT = 0.15, 1.0  # of the tracks' plan, in its widths
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#b8a800")
 """Distinct for colour-blind people, too (Okabe and Ito 2008); the last one darker, for white paper."""
 
@@ -72,9 +73,11 @@ def _draw_box(panel: Any, place: int, values: Sequence[float], colour: str) -> N
 
 def _draw_tracks(figure: Any, variants: Mapping[str, Sequence[Row]]) -> bool:
     """Every track from above; that of a run that is no success is dashed and ends in a cross."""
-    if not any(row.get(TRACK) for rows in variants.values() for row in rows):
+    points = [point for rows in variants.values() for row in rows for point in row.get(TRACK) or ()]
+    if not points:
         return False
-    figure.set_size_inches(6.4, 5.4)
+    width, height = np.ptp(points, axis=0).tolist()
+    figure.set_size_inches(6.4, 1.2 + 5.4 * min(max(height / max(width, 1e-9), LEAST_HEIGHT), MOST_HEIGHT))
     panel = figure.subplots()
     for (name, rows), colour in zip(variants.items(), _colours(len(variants)), strict=True):
         label: str | None = _shown(name)

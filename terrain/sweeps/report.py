@@ -60,6 +60,7 @@ TEST_COLUMNS = ("first", "second", "metric", "pairs", "difference", "p", "p_holm
 STYLE = (
     "body{font:14px sans-serif;margin:2em}table{border-collapse:collapse;margin-bottom:2em}"
     "th,td{border:1px solid #bbb;padding:.2em .6em;text-align:right}td.text{text-align:left}"
+    ".wide{overflow-x:auto}td{white-space:nowrap}svg{max-width:100%;height:auto}"
     "tr.success{background:#e6f4e9}tr.arrived{background:#fdf3d3}tr.failed{background:#fbe3e0}"
 )
 
@@ -194,14 +195,16 @@ def _page(
         parts += ["<h2>Medians, quartiles and 95 % intervals</h2>", html_table(spreads)]
     if tests:
         parts += ["<h2>Tests of two variants, seed by seed</h2>", f"<p>{TESTS}</p>", html_table(tests)]
-    parts += ["<h2>All runs</h2>", html_table(table)]
+    first = ("variant", "seed", "folder")  # a link at the end of a wide table is not found
+    parts += ["<h2>All runs</h2>", html_table([{**{name: row[name] for name in first}, **row} for row in table])]
     return html_page(title, parts)
 
 
 def html_page(title: str, parts: Iterable[str]) -> str:
     """Return a page with a heading and parts that are HTML; it needs no other file."""
     return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
+        '<!doctype html><html lang="en"><meta charset="utf-8">'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{html.escape(title)}</title>'
         f"<style>{STYLE}</style><h1>{html.escape(title)}</h1>{''.join(parts)}</html>\n"
     )
 
@@ -218,7 +221,7 @@ def html_table(rows: Sequence[Row]) -> str:
     head = "".join(f"<th>{html.escape(name)}</th>" for name in rows[0])
     lines = ((row.get("level", ""), "".join(map(_html_cell, row, row.values()))) for row in rows)
     body = "".join(f'<tr class="{level}">{cells}</tr>' for level, cells in lines)
-    return f"<table><tr>{head}</tr>{body}</table>"
+    return f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'
 
 
 def _html_cell(name: str, value: object) -> str:

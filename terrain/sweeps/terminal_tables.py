@@ -40,13 +40,16 @@ def summary_table(rows: Sequence[Row]) -> Table:
     return table
 
 
-def comparison_table(rows: Sequence[Row]) -> Table | None:
-    """Return a table of the tests whose corrected p is below 0.05; None where there are no two variants."""
+def comparison_table(rows: Sequence[Row]) -> Table | str | None:
+    """Return a table of the tests whose corrected p is below 0.05, a line if none is, None without two variants."""
     tests, letters = compare_variants(rows), letters_of(rows)
     if not tests:
         return None
     clear = [test for test in tests if test.corrected < SIGNIFICANT]
-    table = _table(f"corrected p below {SIGNIFICANT:g}: {len(clear)} of {len(tests)} tests, see tests.csv")
+    title = f"corrected p below {SIGNIFICANT:g}: {len(clear)} of {len(tests)} tests, see tests.csv"
+    if not clear:
+        return title
+    table = _table(title)
     table.add_column("metric")
     for name in ("pairs", "difference", "p (Holm)"):
         table.add_column(name, justify="right")

@@ -21,6 +21,7 @@ h1 { font-size: 1.5em; margin-bottom: 0; } h2 { font-size: 1.15em; margin-top: 2
 .outcome { font-size: 1.15em; font-weight: 600; }
 table { border-collapse: collapse; } td, th { text-align: left; padding: 2px 14px 2px 0; vertical-align: top; }
 th { color: #555; font-weight: 600; border-bottom: 1px solid #ccc; } td:first-child { white-space: nowrap; }
+td { overflow-wrap: anywhere; }
 img { max-width: 100%; height: auto; } svg { width: 100%; height: auto; } summary { color: #555; cursor: pointer; }
 .beside { display: grid; grid-auto-flow: column; grid-auto-columns: 1fr; gap: 0 2em; align-items: start; }
 .beside > * { min-width: 0; }
@@ -68,7 +69,11 @@ def table(header: tuple[str, ...], rows: Iterable[tuple[Any, ...]]) -> str:
 
 
 def cell(value: Any) -> str:
-    """A value as short text."""
+    """A value as short text, those in lists and by names too."""
     if isinstance(value, float) and math.isfinite(value):
         return f"{value:.4g}"
-    return ", ".join(map(str, value)) or "none" if isinstance(value, list) else str(value)
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {cell(of)}" for name, of in value.items()) or "none"
+    if isinstance(value, list):
+        return ("; " if any(isinstance(of, dict) for of in value) else ", ").join(map(cell, value)) or "none"
+    return str(value)

@@ -17,7 +17,7 @@ from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.run_picture import picture_png
-from terrain.viewer.reports.page import MAX_ROWS
+from terrain.viewer.reports.page import MAX_ROWS, cell
 from terrain.viewer.reports.report import report_html
 from terrain.viewer.reports.timeline import Bar, action_bars, plugin_bars, timeline_svg
 
@@ -101,3 +101,18 @@ def test_the_pictures_of_a_report_are_smaller_than_the_picture_alone(hill_record
     shown = [base64.b64decode(data) for data in re.findall(r"base64,([^\"]+)", report_of(hill_recording))]
     assert [Image.open(io.BytesIO(data)).size for data in shown] == [Image.open(io.BytesIO(drawn)).size]
     assert sum(map(len, shown)) < 0.5 * len(drawn)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.123456, "0.1235"),
+        ([0.15, 17.188733853], "0.15, 17.19"),
+        ([{"angle_deg": 3.9055440, "distance_m": 0.128872}, {"angle_deg": 1.0}],
+         "angle_deg 3.906, distance_m 0.1289; angle_deg 1"),
+        ([], "none"),
+        (True, "True"),
+    ],
+)  # fmt: skip
+def test_a_value_in_a_table_is_short_also_within_lists_and_names(value, text):
+    assert cell(value) == text
