@@ -37,7 +37,7 @@ def headline_html(time: float, sequence: GoalSequence) -> str:
     """Simulated time [s], and the goal the robot goes to, or how the last one has ended."""
     if sequence.target is not None:
         x, y, z = sequence.target.position
-        text = _coloured(f"going to {x:.1f}, {y:.1f}, {z:.1f}", BUSY)
+        text = _coloured(f"going to {x:.1f}, {y:.1f}, {z:.1f} m", BUSY)
     elif sequence.last_result is not None:
         result = sequence.last_result
         text = _coloured(outcome_text(result.outcome, result.message), GOOD if result.success else BAD)
