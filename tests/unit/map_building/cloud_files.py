@@ -1,7 +1,12 @@
-"""Writers of point clouds in every format that is read, for tests."""
+"""Writers of point clouds in every format that is read, and what reading a bad one says, for tests."""
 
 import numpy as np
+import pytest
 
+from mbf_mesh_nav.building.clouds.point_cloud import read_clouds
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+
+POINTS = np.round(np.random.default_rng(5).uniform((0, 0, 0), (30, 20, 4), (400, 3)), 3)
 PCD_HEADER = """\
 VERSION 0.7
 FIELDS x _ y z
@@ -14,6 +19,13 @@ VIEWPOINT 0 0 0 1 0 0 0
 POINTS {count}
 DATA {form}
 """
+
+
+def refusal(file, **options):
+    """The text with which a file is refused."""
+    with pytest.raises(MeshError) as caught:
+        read_clouds([file], **options)
+    return str(caught.value)
 
 
 def write_ply(file, points, form="binary_little_endian", kind="double", promised=None):
