@@ -48,16 +48,17 @@ def read_urdf(file: Path) -> Urdf:
 
 def _judge_origins(urdf: Urdf) -> None:
     """An origin that cannot be read is a mistake if a mass or a shape hangs on it, else a note."""
-    problems = [joint for joint in urdf.joints.values() if joint.origin_problem is not None]
     serious = []
-    for joint in problems:
+    for joint in urdf.joints.values():
+        if joint.origin_problem is None:
+            continue
         below = [urdf.links[name] for name in subtree(urdf, joint.child)]
         if any(link.shapes or link.inertial for link in below):
             serious.append(joint.origin_problem)
         else:
             urdf.notes.append(f"{joint.name}: its origin cannot be read and counts as zero; nothing solid hangs on it")
     if serious:
-        raise ConfigError([finding for finding in serious if finding is not None])
+        raise ConfigError(serious)
 
 
 class _Reader:
@@ -67,11 +68,8 @@ class _Reader:
         self.file = file
         self.findings: list[Finding] = []
 
-    def finding(self, element: Element, key: str, expected: str, got: str, hint: str = "") -> Finding:
-        return Finding(str(self.file), element.line, key, expected, got, hint)
-
     def refuse(self, element: Element, key: str, expected: str, got: str, hint: str = "") -> None:
-        self.findings.append(self.finding(element, key, expected, got, hint))
+        self.findings.append(Finding(str(self.file), element.line, key, expected, got, hint))
 
     def named(self, root: Element, tag: str) -> list[Element]:
         """Elements of a kind that have a name of their own."""
@@ -110,7 +108,10 @@ class _Reader:
             lower, upper = lower or 0.0, upper or 0.0
         if limit is not None and lower is not None and upper is not None and lower > upper:
             self.refuse(limit, f"{key}: limit", "lower <= upper", f"lower {lower:g}, upper {upper:g}")
-        transform, problem = self._origin(element, key)
+        before = len(self.findings)
+        transform = self._origin(element, key)
+        origin_problems = self.findings[before:]
+        del self.findings[before:]
         return Joint(
             name=name,
             kind=kind,
@@ -123,7 +124,7 @@ class _Reader:
             effort=known.get("effort"),
             velocity=known.get("velocity"),
             line=element.line,
-            origin_problem=problem,
+            origin_problem=next(iter(origin_problems), None),
         )
 
     def base_of(self, root: Element, links: dict[str, Link], joints: dict[str, Joint]) -> str:
@@ -170,22 +171,13 @@ class _Reader:
             self.refuse(found, f"{key}: axis", "a direction", "0 0 0")
         return unit(axis)
 
-    def _origin(self, element: Element, key: str) -> tuple[FloatArray, Finding | None]:
-        """The transform of an element's <origin>, and what is wrong with it."""
+    def _origin(self, element: Element, key: str) -> FloatArray:
+        """The transform of an element's <origin>; none is the identity."""
         found = element.first("origin")
         if found is None:
-            return np.eye(4), None
-        before = len(self.findings)
+            return np.eye(4)
         xyz, rpy = (self.numbers(found, name, 3, f"{key}: origin") for name in ("xyz", "rpy"))
-        problems = self.findings[before:]
-        del self.findings[before:]
-        return transform_of(xyz or (0.0, 0.0, 0.0), rpy or (0.0, 0.0, 0.0)), problems[0] if problems else None
-
-    def _sound_origin(self, element: Element, key: str) -> FloatArray:
-        transform, problem = self._origin(element, key)
-        if problem is not None:
-            self.findings.append(problem)
-        return transform
+        return transform_of(xyz or (0.0, 0.0, 0.0), rpy or (0.0, 0.0, 0.0))
 
     def _inertial(self, element: Element, key: str) -> Inertial:
         mass, inertia = element.first("mass"), element.first("inertia")
@@ -199,7 +191,7 @@ class _Reader:
         ixx, iyy, izz, ixy, ixz, iyz = (0.0 if value is None else value[0] for value in values)
         if inertia is not None and min(ixx, iyy, izz) < 0.0:
             self.refuse(inertia, f"{key}: inertia", "moments ixx, iyy, izz >= 0 kg m2", f"{min(ixx, iyy, izz):g}")
-        transform = self._sound_origin(element, f"{key}: inertial")
+        transform = self._origin(element, f"{key}: inertial")
         return Inertial(0.0 if read is None else read[0], transform, (ixx, iyy, izz, ixy, ixz, iyz), element.line)
 
     def _shape(self, element: Element, key: str) -> Placed | None:
@@ -210,7 +202,7 @@ class _Reader:
             self.refuse(geometry or element, f"{key}: geometry", "one box, cylinder, sphere or mesh", got)
             return None
         solid = self._solid(children[0], f"{key}: {children[0].tag}")
-        transform = self._sound_origin(element, f"{key}: collision")
+        transform = self._origin(element, f"{key}: collision")
         return None if solid is None else Placed(solid, transform)
 
     def _solid(self, element: Element, key: str) -> Solid | None:
@@ -239,10 +231,10 @@ class _Reader:
         self, element: Element, name: str, count: int, key: str, least: float | None = None
     ) -> tuple[float, ...] | None:
         """Numbers of an attribute; None if it is missing or wrong, which for an origin means zero."""
-        text = element.attributes.get(name)
+        text, wanted = element.attributes.get(name), "a finite number" if count == 1 else f"{count} finite numbers"
         if text is None:
             if name not in ("rpy", "xyz"):
-                self.refuse(element, f"{key}: {name}", _how_many(count), "nothing")
+                self.refuse(element, f"{key}: {name}", wanted, "nothing")
             return None
         try:
             values = tuple(map(float, text.split()))
@@ -251,10 +243,6 @@ class _Reader:
         sound = len(values) == count and all(abs(value) <= LARGEST for value in values)  # also refuses nan
         if not sound or (least is not None and min(values) <= least):
             bound = f" above {least:g}" if least is not None else ""
-            self.refuse(element, f"{key}: {name}", f"{_how_many(count)}{bound}", repr(text[:60]))
+            self.refuse(element, f"{key}: {name}", f"{wanted}{bound}", repr(text[:60]))
             return None
         return values
-
-
-def _how_many(count: int) -> str:
-    return "a finite number" if count == 1 else f"{count} finite numbers"

@@ -14,6 +14,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 STANDARD_OUTPUT, STANDARD_ERROR = 1, 2
+GRAVITY = 9.81  # m/s^2
 
 
 class SimulatorMissingError(ImportError):
@@ -57,8 +58,8 @@ def _flush_native_buffers() -> None:
         ctypes.CDLL(None).fflush(None)
 
 
-def connect() -> Any:
-    """Make an empty PyBullet world without a window and return its client, a ``BulletClient``.
+def connect(time_step: float) -> Any:
+    """Make an empty PyBullet world without a window, with steps of ``time_step`` [s]; return its ``BulletClient``.
 
     The client has all functions of ``pybullet`` with the number of this world filled in.
 
@@ -72,6 +73,15 @@ def connect() -> Any:
             import pybullet
             from pybullet_utils.bullet_client import BulletClient
 
-            return BulletClient(pybullet.DIRECT)
+            client = BulletClient(pybullet.DIRECT)
     except ImportError as error:
         raise SimulatorMissingError("this world needs PyBullet: pip install 'mbf-flex[sim]'") from error
+    client.setGravity(0, 0, -GRAVITY)
+    client.setPhysicsEngineParameter(
+        fixedTimeStep=time_step,
+        numSolverIterations=50,
+        deterministicOverlappingPairs=1,
+        enableConeFriction=0,  # with the cone on, a skid-steered robot turns at a fifth of the commanded rate
+        enableFileCaching=0,  # meshes are cached by file name otherwise, even if the file has changed
+    )
+    return client

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -162,19 +161,19 @@ class IncidentMonitor:
         self._moved_in_contact = bool(sample.touched) and (self._moved_in_contact or moves)
         self._sum_up(sample)
         limits, standing = self.limits, self._standing_time(sample)
-        conditions: list[tuple[IncidentKind, float, Callable[[MotionSample], bool]]] = [
-            (IncidentKind.TIPPED_OVER, limits.tilt_hold, self._is_tipped),
-            (IncidentKind.SLIPPING, limits.slip_hold, lambda s: slip_speed(s) > limits.slip_speed),
-            (IncidentKind.HIGH_CENTRED, 0.0, lambda s: s.body_on_ground and standing >= limits.high_centred_hold),
-            (IncidentKind.STUCK, 0.0, lambda s: standing >= limits.stuck_hold),
-            (IncidentKind.COLLISION, 0.0, lambda s: bool(s.touched)),
-            (IncidentKind.COLLISION_WHILE_MOVING, 0.0, lambda s: self._moved_in_contact),
-            *((kind, 0.0, lambda s, t=thing: t in s.touched) for thing, kind in COLLISIONS_WITH.items()),
+        conditions = [
+            (IncidentKind.TIPPED_OVER, limits.tilt_hold, tilt_of(sample.pose) > limits.tilt),
+            (IncidentKind.SLIPPING, limits.slip_hold, sample.slip_speed > limits.slip_speed),
+            (IncidentKind.HIGH_CENTRED, 0.0, sample.body_on_ground and standing >= limits.high_centred_hold),
+            (IncidentKind.STUCK, 0.0, standing >= limits.stuck_hold),
+            (IncidentKind.COLLISION, 0.0, bool(sample.touched)),
+            (IncidentKind.COLLISION_WHILE_MOVING, 0.0, self._moved_in_contact),
+            *((kind, 0.0, thing in sample.touched) for thing, kind in COLLISIONS_WITH.items()),
         ]
         begun = [
             self._incident(kind, sample, before, moves)
-            for kind, hold, condition in conditions
-            if self._begins(kind, hold, condition(sample), sample.pose.stamp)
+            for kind, hold, holds in conditions
+            if self._begins(kind, hold, holds, sample.pose.stamp)
         ]
         return begun + self._missed(sample, moves)
 
@@ -200,7 +199,7 @@ class IncidentMonitor:
         if self._last is not None:
             passed = sample.pose.stamp - self._last.pose.stamp
             self.distance += sample.pose.distance_to(self._last.pose)
-            self.slipped += slip_speed(sample) * passed
+            self.slipped += sample.slip_speed * passed
             self.energy += sample.power * passed
         self._last = sample
 
@@ -235,9 +234,6 @@ class IncidentMonitor:
         self.counts[kind] += 1
         return True
 
-    def _is_tipped(self, sample: MotionSample) -> bool:
-        return tilt_of(sample.pose) > self.limits.tilt
-
     def _standing_time(self, sample: MotionSample) -> float:
         """How long [s] the robot has been asked to move without getting anywhere; wheels that twitch do not count."""
         limits = self.limits
@@ -249,8 +245,3 @@ class IncidentMonitor:
     def _has_progressed(self, before: Pose, now: Pose) -> bool:
         limits = self.limits
         return now.distance_to(before) > limits.progress_distance or now.angle_to(before) > limits.progress_angle
-
-
-def slip_speed(sample: MotionSample) -> float:
-    """Speed [m/s] at which the robot moves other than its wheels roll: sliding forward, backward or sideways."""
-    return math.hypot(sample.rolling.vx - sample.velocity.vx, sample.velocity.vy)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -67,3 +68,8 @@ class MotionSample:
     touched: frozenset[Thing] = frozenset()
     power: float = 0.0
     others: tuple[Other, ...] = ()
+
+    @property
+    def slip_speed(self) -> float:
+        """Speed [m/s] at which the robot moves other than its wheels roll: sliding forward, backward or sideways."""
+        return math.hypot(self.rolling.vx - self.velocity.vx, self.velocity.vy)

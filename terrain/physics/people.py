@@ -16,14 +16,13 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from scipy import ndimage
 
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from terrain.physics.actors import COURTESY, PERSON, AnyWorld, Body, closed_route
 from terrain.physics.protocols import SimulatedRobot
-from terrain.worlds.occupancy import OccupancyGrid
 from terrain.worlds.surface import cylinder
+from terrain.worlds.wall_clearance import Walls
 
 HORIZON = 4.0  # m; how far a person looks
 AHEAD = 1.5  # m; where on its route it wants to be, from where it is
@@ -32,7 +31,6 @@ REACTION = 0.5  # s; it could stop within this time
 ACCELERATION = 1.5  # m/s^2
 ELBOW_ROOM = 0.1  # m; the distance it keeps to other people and robots; to ours, that of ``COURTESY``
 WALL_MARGIN = 0.05  # m; the distance it keeps to walls
-STEP = 0.02  # m; the least step of a look along a direction
 PERIOD = 0.1  # s between two decisions
 RIGHT_FIRST = [sign * angle for angle in range(0, 81, 10) for sign in (-1, 1)][1:]  # degrees
 TURNS = [(math.cos(math.radians(angle)), math.sin(math.radians(angle))) for angle in RIGHT_FIRST]
@@ -54,34 +52,6 @@ class Walking(Protocol):
 
     def velocity(self) -> Vector:
         """Velocity in the map [m/s]."""
-
-
-class Walls:
-    """How far one can walk between the walls of a building."""
-
-    def __init__(self, grid: OccupancyGrid) -> None:
-        self._grid = grid
-        self._clearance = ndimage.distance_transform_edt(~grid.occupied) * grid.resolution
-
-    def clearance(self, x: float, y: float) -> float:
-        """Distance [m] from the cell at (x, y) to the nearest occupied one; inf outside of the map."""
-        ix = math.floor((x - self._grid.origin_x) / self._grid.resolution)
-        iy = math.floor((y - self._grid.origin_y) / self._grid.resolution)
-        ny, nx = self._clearance.shape
-        return float(self._clearance[iy, ix]) if 0 <= ix < nx and 0 <= iy < ny else math.inf
-
-    def free_distance(self, x: float, y: float, ux: float, uy: float, radius: float, limit: float) -> float:
-        """How far [m] a circle can move from (x, y) in the direction (ux, uy), at most ``limit``.
-
-        Each step is as long as the clearance allows. Who is too near to a wall already may move away from it.
-        """
-        along, least = 0.0, min(radius, self.clearance(x, y))
-        while along < limit:
-            room = self.clearance(x + along * ux, y + along * uy) - least
-            if room < 0.0:
-                return max(0.0, along - STEP)
-            along += max(room, STEP)
-        return limit
 
 
 def distance_to_meeting(offset: Vector, velocity: Vector, direction: Vector, speed: float, reach: float) -> float:

@@ -28,7 +28,6 @@ from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 from terrain.worlds.surface import Surface, box, cylinder, joined, level_rectangle
 
 TIME_STEP = 1.0 / 240.0
-GRAVITY = 9.81
 MAX_HEIGHTFIELD_SAMPLES = 2**21  # Bullet's upload buffer: 8 MiB of float32, the rest is cut without an error
 MAX_RAYS_PER_CALL = 16_000  # Bullet answers at most 16,383 rays and drops the next one silently
 RAY_MARGIN = 1.0  # metres above and below the world where vertical rays start and end
@@ -37,7 +36,6 @@ RAY_MARGIN = 1.0  # metres above and below the world where vertical rays start a
 # it in each step. A ray is of Bullet's group 1 and hits the groups in its mask.
 RAY, STATIC, ROBOT, MOVING = 1, 2, 4, 8
 EVERY_GROUP = RAY | STATIC | ROBOT | MOVING
-
 ORIGIN = Pose((0.0, 0.0, 0.0))
 
 
@@ -63,7 +61,7 @@ class BulletWorld:
 
     def __init__(self, time_step: float = TIME_STEP) -> None:
         self.time_step = time_step
-        self.bullet = connect()
+        self.bullet = connect(time_step)
         self.step_count = 0
         self.ground_bodies: set[int] = set()
         self.things: dict[int, Thing] = {}
@@ -73,14 +71,6 @@ class BulletWorld:
         self._before_step: list[Callable[[], None]] = []
         self._after_step: list[Callable[[], None]] = []
         self._closed = False
-        self.bullet.setGravity(0, 0, -GRAVITY)
-        self.bullet.setPhysicsEngineParameter(
-            fixedTimeStep=time_step,
-            numSolverIterations=50,
-            deterministicOverlappingPairs=1,
-            enableConeFriction=0,  # with the cone on, a skid-steered robot turns at a fifth of the commanded rate
-            enableFileCaching=0,  # meshes are cached by file name otherwise, even if the file has changed
-        )
 
     def __enter__(self) -> BulletWorld:
         return self
@@ -134,10 +124,8 @@ class BulletWorld:
             More than 2**21 samples, which Bullet would cut off silently.
         """
         if terrain.heights.size > MAX_HEIGHTFIELD_SAMPLES:
-            raise ValueError(
-                f"a Bullet heightfield holds at most {MAX_HEIGHTFIELD_SAMPLES} samples, this one has {terrain.ny} x "
-                f"{terrain.nx}; crop or resample it, or use add_mesh"
-            )
+            text = f"at most {MAX_HEIGHTFIELD_SAMPLES} samples, this one has {terrain.ny} x {terrain.nx}"
+            raise ValueError(f"a Bullet heightfield holds {text}; crop or resample it, or use add_mesh")
         shift = float(terrain.heights.max())
         raw = terrain.heights - np.float32(shift)
         shape = self.bullet.createCollisionShape(
@@ -193,8 +181,7 @@ class BulletWorld:
         moving : bool
             True for a box that an actor sets to new poses: ``MovingRays`` see it, ``StaticRays`` do not.
         """
-        half = [0.5 * length for length in size]
-        shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half)
+        shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=[0.5 * length for length in size])
         return self._add_body(shape, pose, MOVING if moving else STATIC, box(size))
 
     def add_cylinder(self, pose: Pose, radius: float, height: float, moving: bool = False) -> int:

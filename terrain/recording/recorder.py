@@ -23,7 +23,8 @@ from terrain.physics.protocols import Actor
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorded_maps import RecordedGrid, RecordedLayer, RecordedMesh, add_if_changed, half_precision
 from terrain.recording.recorded_objects import RecordedObjects
-from terrain.recording.recording import Recording, RobotShape, StampedPoints
+from terrain.recording.recording import Recording, StampedPoints
+from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import UNFINISHED, Verdict
 from terrain.worlds.surface import Surface
 

@@ -16,12 +16,13 @@ from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.physics.actors import PERSON, PERSON_HEIGHT, PERSON_RADIUS, Body, RouteWalker, SlidingDoor, other_robot
-from terrain.physics.people import Person, Walls
+from terrain.physics.people import Person
 from terrain.physics.robot_models import ROBOTS
 from terrain.scenarios.obstacles import Size
 from terrain.scenarios.places import PlanarPose
 from terrain.scenarios.world import ScenarioWorld
 from terrain.worlds.occupancy import OccupancyGrid
+from terrain.worlds.wall_clearance import Walls
 
 MAX_ROUTE_DRAWS = 10_000
 LONGEST_LEG = 12.0  # m; short legs of a drawn route are found sooner

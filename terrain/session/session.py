@@ -30,7 +30,7 @@ from terrain.physics.incidents import ANY_COLLISION, COLLISIONS_WITH, Incident
 from terrain.physics.simulation import Simulation
 from terrain.provenance.named_files import InputCopies
 from terrain.recording.recorder import Recorder
-from terrain.recording.recording import RobotShape
+from terrain.recording.robot_shape import RobotShape
 from terrain.scenarios.environment import with_noise
 from terrain.scenarios.faults import FaultSchedule
 from terrain.scenarios.scenario import Scenario, load_scenario

@@ -11,9 +11,9 @@ import math
 
 from mbf_abstract.geometry import Twist
 from mbf_abstract.geometry.arithmetic import rotated, rotated_back
+from terrain.physics.bullet import GRAVITY
 from terrain.physics.drive import commanded_twist
 from terrain.physics.robots import BODY_LINK, STANDSTILL, TOUCHING_DISTANCE, WheeledRobot
-from terrain.physics.world import GRAVITY
 
 RESPONSE = 0.05  # s; time in which the speed comes to a third of its distance from the command
 

@@ -11,7 +11,8 @@ from mbf_abstract.geometry import Pose, Twist
 from terrain.commands.run import register
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.recorder import Recorder
-from terrain.recording.recording import Recording, RobotShape
+from terrain.recording.recording import Recording
+from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 
 

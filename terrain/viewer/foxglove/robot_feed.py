@@ -21,7 +21,8 @@ from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import unix_seconds
 from terrain.recording.recorded_maps import RecordedGrid, RecordedMesh, add_if_changed
 from terrain.recording.recorder import MAP_PERIOD, MAX_GRID_CELLS, Recorder
-from terrain.recording.recording import Recording, RobotShape
+from terrain.recording.recording import Recording
+from terrain.recording.robot_shape import RobotShape
 from terrain.viewer.foxglove.feeds import EventQueue
 
 BODY_HEIGHT = 0.3  # m, of a robot of which only the outline is known

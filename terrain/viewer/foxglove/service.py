@@ -15,15 +15,12 @@ from terrain.recording.recording import Recording
 from terrain.viewer.foxglove import protocol
 from terrain.viewer.foxglove.channels import Channels, FoxgloveClient
 from terrain.viewer.foxglove.protocol import Call, Level, ProtocolError, Published, list_in, number_in, text_in
-from terrain.viewer.foxglove.steering import INPUTS, SERVICES, Steering
+from terrain.viewer.foxglove.steering import INPUTS, SERVICES, Steering, advertised_services
 from terrain.viewer.logs.run_messages import RunMessages
 
 WATCHING = ("time", "parameters")
 STEERING = (*WATCHING, "clientPublish", "services")
 """Capabilities, by what a client may do."""
-TRIGGER = "std_srvs/srv/Trigger"
-REQUEST = {"type": "object"}
-RESPONSE = {"type": "object", "properties": {"success": {"type": "boolean"}, "message": {"type": "string"}}}
 MOST_PROBLEMS = 5  # of one operation that are named
 UNHEARD = "unheard"
 Operation = dict[str, Any]
@@ -99,7 +96,7 @@ class FoxgloveService:
         client.outbox.answer(protocol.server_info(self._name, self._session_id, STEERING if steers else WATCHING))
         client.outbox.answer(protocol.advertise(self._channels.advertised()))
         if steers:
-            client.outbox.answer(protocol.advertise_services(_services()))
+            client.outbox.answer(protocol.advertise_services(advertised_services()))
         self._channels.welcome(client)
         return client
 
@@ -235,21 +232,3 @@ def _request(operation: Operation) -> str | None:
 
 def _report(client: FoxgloveClient, text: str) -> None:
     client.outbox.answer(protocol.status(Level.ERROR, text))
-
-
-def _services() -> list[dict[str, Any]]:
-    """The services, as they are advertised; older clients look for ``requestSchema`` and ``responseSchema``."""
-    request, response = json.dumps(REQUEST), json.dumps(RESPONSE)
-    schema = {"encoding": "json", "schemaEncoding": "jsonschema"}
-    return [
-        {
-            "id": number,
-            "name": name,
-            "type": TRIGGER,
-            "requestSchema": request,
-            "responseSchema": response,
-            "request": {**schema, "schemaName": f"{TRIGGER}_Request", "schema": request},
-            "response": {**schema, "schemaName": f"{TRIGGER}_Response", "schema": response},
-        }
-        for number, name in enumerate(SERVICES, 1)
-    ]

@@ -30,6 +30,27 @@ SERVICES = {
     RESUME: "The goals go on.",
 }
 """Services that clients call, of type std_srvs/srv/Trigger, and what they answer."""
+TRIGGER = "std_srvs/srv/Trigger"
+REQUEST = {"type": "object"}
+RESPONSE = {"type": "object", "properties": {"success": {"type": "boolean"}, "message": {"type": "string"}}}
+
+
+def advertised_services() -> list[dict[str, Any]]:
+    """The services, as they are advertised; older clients look for ``requestSchema`` and ``responseSchema``."""
+    request, response = json.dumps(REQUEST), json.dumps(RESPONSE)
+    schema = {"encoding": "json", "schemaEncoding": "jsonschema"}
+    return [
+        {
+            "id": number,
+            "name": name,
+            "type": TRIGGER,
+            "requestSchema": request,
+            "responseSchema": response,
+            "request": {**schema, "schemaName": f"{TRIGGER}_Request", "schema": request},
+            "response": {**schema, "schemaName": f"{TRIGGER}_Response", "schema": response},
+        }
+        for number, name in enumerate(SERVICES, 1)
+    ]
 
 
 class Steering:

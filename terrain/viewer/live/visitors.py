@@ -11,7 +11,8 @@ from terrain.viewer.live.cameras import Cameras, ray_through
 from terrain.viewer.live.controls import LiveControls, Ray
 from terrain.viewer.live.readout import Readout
 from terrain.viewer.live.stick import Stick
-from terrain.viewer.server.visitor_channel import Place, VisitorChannel
+from terrain.viewer.server.visitor_channel import VisitorChannel
+from terrain.viewer.server.visitor_messages import Place
 
 
 class Visitors:

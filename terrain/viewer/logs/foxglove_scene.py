@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorded_objects import RecordedObjects
-from terrain.recording.recording import Recording, RobotShape
+from terrain.recording.recording import Recording
+from terrain.recording.robot_shape import RobotShape
 from terrain.viewer.logs.foxglove_messages import colour, points, pose, timestamp, triangles
 from terrain.viewer.pictures.colours import ACTORS, BODY, DRIVEN, TRACKED, WHEEL, Colour
 from terrain.viewer.pictures.shading import vertex_colours

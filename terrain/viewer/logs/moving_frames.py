@@ -10,7 +10,8 @@ import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 
 from mbf_abstract.geometry import FloatArray
-from terrain.recording.recording import Recording, RobotShape
+from terrain.recording.recording import Recording
+from terrain.recording.robot_shape import RobotShape
 from terrain.viewer.logs import foxglove_messages as message
 from terrain.viewer.logs import foxglove_scene as scene
 from terrain.viewer.scene import wheel_angles

@@ -37,19 +37,16 @@ from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from mbf_abstract.events import Event, EventKind
-from mbf_abstract.outcomes import is_success, outcome_name
+from mbf_abstract.events import Event
 from terrain.recording.metrics import cross_track_errors
 from terrain.recording.recording import Recording, StampedPoints
 from terrain.viewer.logs import foxglove_messages as message
 from terrain.viewer.logs import foxglove_scene as scene
+from terrain.viewer.logs.event_messages import ActionStates, JsonMessage, event_message, log_message
 from terrain.viewer.logs.foxglove_mesh_costs import MeshCosts
 from terrain.viewer.logs.moving_frames import MovingFrames, Track
-from terrain.viewer.reports.event_lines import NOTABLE, event_text
 from terrain.viewer.reports.timeline import ACTIONS
 
-ERRORS = {EventKind.FAULT, EventKind.QUARANTINE, EventKind.SINK_FAILED}
-DETAILS = {EventKind.STATE_CHANGED, EventKind.PLUGIN_CALL_STARTED, EventKind.PLUGIN_CALL_ENDED}
 MAX_PIECES = 2000  # of the track, some three hours of driving; then the oldest are replaced
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 MOTION = ("speed", "commanded_speed", "yaw_rate", "commanded_yaw_rate", "tilt_deg", "cross_track_error")
@@ -72,14 +69,6 @@ TOPICS: dict[str, Any] = {
     "/motion": "mbf.Motion",
 }
 """Of each topic the class of its protobuf messages, or the name of its JSON schema."""
-
-
-@dataclass(frozen=True)
-class JsonMessage:
-    """A message of a schema of our own: ``values`` are written as JSON."""
-
-    schema: str
-    values: Mapping[str, Any]
 
 
 def json_schema(name: str) -> str:
@@ -200,8 +189,8 @@ class RunMessages:
 
     def _events(self, events: Iterable[Event]) -> Iterator[Stamped]:
         for event in events:
-            yield Stamped(event.time, "/log", partial(_log, event))
-            yield Stamped(event.time, "/events", partial(_event, event))
+            yield Stamped(event.time, "/log", partial(log_message, event))
+            yield Stamped(event.time, "/events", partial(event_message, event))
             if self._actions.take(event):
                 yield _json(event.time, "/actions", "mbf.ActionStates", self._actions.states, part="")
 
@@ -213,35 +202,6 @@ class RunMessages:
         for time, row in zip(part.times.tolist(), np.column_stack(columns).round(6).tolist(), strict=True):
             finite = {name: value for name, value in zip(MOTION, row, strict=True) if math.isfinite(value)}
             yield _json(time, "/motion", "mbf.Motion", finite)
-
-
-class ActionStates:
-    """What every action does: idle, active, or the outcome of its last goal.
-
-    Attributes
-    ----------
-    states : dict of str to str
-        By action; another one after each change.
-    """
-
-    def __init__(self) -> None:
-        self.states: dict[str, str] = dict.fromkeys(ACTIONS, "idle")
-        self._newest: dict[str, Any] = {}
-
-    def take(self, event: Event) -> bool:
-        """Take the next event; returns whether it has changed a state."""
-        action, goal = event.source, event.data.get("goal_id")
-        if action not in self.states:
-            return False
-        if event.kind is EventKind.GOAL_ACCEPTED:
-            state, self._newest[action] = "active", goal
-        elif event.kind is EventKind.GOAL_FINISHED and goal == self._newest.get(action):
-            code = event.data.get("outcome")
-            state = outcome_name(code) if isinstance(code, int) else "finished"
-        else:
-            return False
-        self.states = self.states | {action: state}
-        return True
 
 
 def _in_order(messages: Iterable[Stamped]) -> list[Stamped]:
@@ -258,22 +218,3 @@ def _static_scene(recording: Recording, time: float) -> Iterator[Stamped]:
     yield Stamped(time, "/scene", partial(scene.robot, recording.robot), "robot")
     if recording.actors:
         yield Stamped(time, "/scene", partial(scene.actors, recording.actors), "actors")
-
-
-def _log(event: Event) -> Log:
-    text = f"{event.kind.value}: {event_text(event)}"
-    return Log(timestamp=message.timestamp(event.time), level=_level(event), message=text, name=event.source)
-
-
-def _level(event: Event) -> Log.Level.ValueType:
-    if event.kind in ERRORS:
-        return Log.ERROR
-    code = event.data.get("outcome")
-    failed = event.kind is EventKind.GOAL_FINISHED and isinstance(code, int) and not is_success(code)
-    if event.kind in NOTABLE or failed:
-        return Log.WARNING
-    return Log.DEBUG if event.kind in DETAILS else Log.INFO
-
-
-def _event(event: Event) -> JsonMessage:
-    return JsonMessage("mbf.Event", json.loads(event.to_json()))

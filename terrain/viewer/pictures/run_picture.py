@@ -10,12 +10,10 @@ Use it for reports and READMEs; it takes about a second. For motion see
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -38,7 +36,7 @@ from terrain.viewer.pictures.picture import (
 )
 from terrain.viewer.pictures.shading import plain_triangles, shaded_triangles
 from terrain.viewer.pictures.shapes import standing_things
-from terrain.viewer.pictures.storeys import storeys
+from terrain.viewer.pictures.storeys import Panel, panels_of, storeys
 from terrain.viewer.replay.world_mesh import coarse_faces
 from terrain.worlds.surface import Surface
 
@@ -46,7 +44,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MAX_NAME = 60  # characters of a name in the title; the picture is as wide as its title
-CUT_SHARE = 0.7  # of a storey's height; what is higher above its floor is not in its panel
 SMALL_ROUTE = 0.3  # of the world's area; a route whose box is smaller is shown larger, with an inset of the world
 MARGIN = 0.15  # of the route's length, around it
 LEAST_SIDE = 0.5  # of the longer side of the route's box
@@ -56,24 +53,6 @@ DASHES = (0, (3.0, 1.4))
 LEGEND_LENGTH = 3.4  # of a line in the legend, in letters: three dashes of a plan
 LEAST_TILT = 1.0  # degrees; on floors there is nothing to say
 INCIDENT_COLOUR = "#b00020"
-
-
-class Panel(NamedTuple):
-    """Axes that show one storey: what is between two heights, and no ground or wall above ``cut`` [m]."""
-
-    axes: Axes
-    low: float
-    high: float
-    floor: float
-    cut: float
-
-    def shows(self, heights: FloatArray) -> NDArray[np.bool_]:
-        """Which of the heights (n,) [m] belong to this storey."""
-        return (heights >= self.low) & (heights < self.high)
-
-    def part(self, points: FloatArray) -> FloatArray:
-        """Points (n, 3) with nan where they are on another storey, so that lines end there."""
-        return np.where(self.shows(points[:, 2])[:, None], points, np.nan)
 
 
 def picture_png(recording: Recording) -> bytes:
@@ -92,7 +71,7 @@ def _drawn(world: Recording, robots: Mapping[str, Recording], driven: str) -> by
     floors = storeys(world.ground)
     shown = whole if floors else _route_extent(world, whole)
     figure, axes = panel_figure(shown, max(len(floors), 1))
-    panels = list(_panels(axes, floors))
+    panels = list(panels_of(axes, floors))
     colours = [FLEET[number % len(FLEET)] if name else DRIVEN for number, name in enumerate(robots)]
     for panel in panels:
         _draw_world(panel, world)
@@ -108,16 +87,6 @@ def _drawn(world: Recording, robots: Mapping[str, Recording], driven: str) -> by
         _draw_inset(axes[0], world, zip(robots.values(), colours, strict=True), whole, shown)
     _label(axes, world, driven)
     return png_bytes(figure)
-
-
-def _panels(axes: list[Axes], floors: list[float]) -> Iterator[Panel]:
-    """A panel for each floor; the middle between two floors parts them."""
-    if not floors:
-        yield Panel(axes[0], -np.inf, np.inf, -np.inf, np.inf)
-    middles = [-np.inf, *(0.5 * (a + b) for a, b in pairwise(floors)), np.inf]
-    for number, floor in enumerate(floors):
-        above = floors[number + 1] if number + 1 < len(floors) else np.inf
-        yield Panel(axes[number], middles[number], middles[number + 1], floor, floor + CUT_SHARE * (above - floor))
 
 
 def _extent(recording: Recording) -> Extent:

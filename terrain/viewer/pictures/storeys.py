@@ -1,4 +1,4 @@
-"""Storeys of a world: level floors that lie one above the other.
+"""Storeys of a world: level floors that lie one above the other, and the panel of a picture that shows each.
 
 Hills have none, however high they are: a storey needs a second level floor above or below it. The views show one
 storey at a time, so that a roof does not hide the robot under it.
@@ -6,12 +6,20 @@ storey at a time, so that a roof does not hide the robot under it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray
 from terrain.viewer.pictures.raster import paint_triangles
 from terrain.viewer.pictures.shading import face_normals
 from terrain.worlds.surface import Surface
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 LEVEL = np.cos(np.radians(5.0))  # faces steeper than 5 degrees are ramps
 POINTS = 256  # along the longer side of the grid of points at which floors are looked for above each other
@@ -19,6 +27,7 @@ HEADROOM = 1.8  # m; floors nearer than this are one storey
 LEAST_OVERLAP = 0.04  # of the points with level faces; less is a step or a bench, no storey
 LEAST_FLOOR = 0.04  # of the area of all level faces
 BIN = 0.1  # m of height
+CUT_SHARE = 0.7  # of a storey's height; what is higher above its floor is not in its panel
 
 
 def storeys(ground: Surface | None) -> list[float]:
@@ -75,3 +84,31 @@ def _floors(heights: FloatArray, areas: FloatArray) -> list[float]:
     sums, moments = np.bincount(run, area)[1:], np.bincount(run, moment)[1:]
     large = sums >= LEAST_FLOOR * area.sum()
     return [float(height) for height in moments[large] / sums[large]]
+
+
+class Panel(NamedTuple):
+    """Axes that show one storey: what is between two heights, and no ground or wall above ``cut`` [m]."""
+
+    axes: Axes
+    low: float
+    high: float
+    floor: float
+    cut: float
+
+    def shows(self, heights: FloatArray) -> NDArray[np.bool_]:
+        """Which of the heights (n,) [m] belong to this storey."""
+        return (heights >= self.low) & (heights < self.high)
+
+    def part(self, points: FloatArray) -> FloatArray:
+        """Points (n, 3) with nan where they are on another storey, so that lines end there."""
+        return np.where(self.shows(points[:, 2])[:, None], points, np.nan)
+
+
+def panels_of(axes: list[Axes], floors: list[float]) -> Iterator[Panel]:
+    """A panel for each floor; the middle between two floors parts them."""
+    if not floors:
+        yield Panel(axes[0], -np.inf, np.inf, -np.inf, np.inf)
+    middles = [-np.inf, *(0.5 * (a + b) for a, b in pairwise(floors)), np.inf]
+    for number, floor in enumerate(floors):
+        above = floors[number + 1] if number + 1 < len(floors) else np.inf
+        yield Panel(axes[number], middles[number], middles[number + 1], floor, floor + CUT_SHARE * (above - floor))

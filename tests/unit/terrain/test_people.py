@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import Pose, Twist
 from terrain.physics.actors import COURTESY, RouteWalker
 from terrain.physics.kinematic_world import KinematicWorld
-from terrain.physics.people import Person, Walls, distance_to_meeting
+from terrain.physics.people import Person, distance_to_meeting
 from terrain.physics.robot_models import HUSKY, TURTLEBOT, RobotSpec
 from terrain.worlds.occupancy import OccupancyGrid
+from terrain.worlds.wall_clearance import Walls
 
 ROUTE = [[0.0, 0.0], [12.0, 0.0]]
 FAR = Pose.planar(100.0, 0.0)

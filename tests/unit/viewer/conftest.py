@@ -17,7 +17,8 @@ from terrain.physics.robot_models import HUSKY, TURTLEBOT
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recorder import Recorder
-from terrain.recording.recording import Recording, RobotShape
+from terrain.recording.recording import Recording
+from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.scenarios.scenario import PlanarPose, Scenario, Sensor, load_scenario
 from terrain.scenarios.world_types import GeneratedWorld

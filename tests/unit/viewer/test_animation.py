@@ -12,7 +12,7 @@ from PIL import Image
 from mbf_abstract.geometry import Pose
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.recorder import Recorder
-from terrain.recording.recording import RobotShape
+from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.animation import FRAMES, SIZE, write_animation
 from terrain.viewer.pictures.colours import BODY, DRIVEN, OBSTACLE, PLANNED, SCAN

@@ -19,12 +19,13 @@ from terrain.physics.robot_models import HUSKY
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorded_objects import RecordedObjects
 from terrain.recording.recorder import MAP_PERIOD, Recorder
-from terrain.recording.recording import Recording, RobotShape
+from terrain.recording.recording import Recording
+from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.session.session import Session
+from terrain.viewer.logs.event_messages import ActionStates
 from terrain.viewer.logs.foxglove_messages import MAP_LIFT, nanoseconds, triangles
 from terrain.viewer.logs.mcap_log import write_mcap
-from terrain.viewer.logs.run_messages import ActionStates
 from terrain.viewer.pictures.colours import WALL
 
 SCHEMAS = {

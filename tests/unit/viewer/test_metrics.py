@@ -24,7 +24,7 @@ from terrain.recording.metrics import (
 )
 from terrain.recording.planning_times import PlanningTimes
 from terrain.recording.recorder import Recorder
-from terrain.recording.recording import RobotShape
+from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.session.robot_run import success_by_path_length
 

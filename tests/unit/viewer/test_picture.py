@@ -13,7 +13,7 @@ from mbf_abstract.geometry import Pose
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorder import Recorder
-from terrain.recording.recording import RobotShape
+from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures import run_picture
 from terrain.viewer.pictures.colours import (

@@ -20,7 +20,7 @@ from terrain.recording.actor_track import ActorTrack
 from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recorded_objects import RecordedObjects
 from terrain.recording.recorder import Recorder
-from terrain.recording.recording import RobotShape
+from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.colours import FLEET
 from terrain.viewer.pictures.moving_picture import status_text

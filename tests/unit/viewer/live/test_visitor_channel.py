@@ -13,7 +13,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from mbf_abstract.access.page_access import PageAccess, Role
 from mbf_abstract.time.clock import WallClock
 from terrain.viewer.server.page_server import page_server
-from terrain.viewer.server.visitor_channel import MAX_REFUSED, PREFIX, VisitorChannel, parsed
+from terrain.viewer.server.visitor_channel import MAX_REFUSED, PREFIX, VisitorChannel
+from terrain.viewer.server.visitor_messages import parsed
 
 PORT = 18750
 RIGHT = [
