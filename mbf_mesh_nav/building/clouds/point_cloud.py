@@ -20,6 +20,7 @@ from mbf_mesh_nav.building.clouds.map_projections import contradicts
 from mbf_mesh_nav.building.clouds.mesh_points import MESH_ENDINGS, read_mesh_points
 from mbf_mesh_nav.building.clouds.octomap_points import read_octomap_points
 from mbf_mesh_nav.building.clouds.pcd_points import read_pcd_points
+from mbf_mesh_nav.building.clouds.plausible_units import refuse_lost_digits, refuse_mixed_units, refuse_units
 from mbf_mesh_nav.building.clouds.ply_points import has_faces, read_ply_points
 from mbf_mesh_nav.building.clouds.run_points import read_run_points
 from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, refuse_count
@@ -44,14 +45,6 @@ MAX_POINTS = 50_000_000
 FAR = 10_000.0
 """Coordinates [m] beyond this are of a grid of a country: the map gets an origin of its own."""
 ORIGIN_STEP = 100.0
-COARSEST_STEP = 0.005
-"""Distance [m] of neighbouring four-byte floats above which a file has lost what a map needs."""
-SHORTEST, LONGEST = 1.0, 50_000.0
-"""Extents [m] of a plausible map."""
-SAME_UNIT_RATIO = 200.0
-"""Extents of two files of one map that differ by more are hardly in the same unit."""
-MIXED_SHARE, RING_SHARE = 0.05, 0.01
-"""Of a file that mixes units: least share of its points in either unit, greatest share around those of the larger."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,35 +118,39 @@ def read_clouds(
         stated[file] = unit or stored.unit
         if stored.crs:
             systems.setdefault(stored.crs, file.name)
-        _refuse_lost_digits(file, points, stored.single_precision, stated[file] or 1.0)
+        refuse_lost_digits(file, points, stored.single_precision, stated[file] or 1.0)
         parts.append(points if is_on_map else on_the_map(points, FileFrame(up_axis or "z", stated[file] or 1.0)))
-        _refuse_mixed_units(file, parts[-1])
+        refuse_mixed_units(file, parts[-1])
         notes += [f"{file.name}: {note}" for note in (*stored.notes, *dropped)]
     if len(set(stated.values())) > 1:
-        text = ", ".join(
-            f"{file.name} {length:g} m" if length else f"{file.name} none" for file, length in stated.items()
-        )
+        text = ", ".join(f"{file.name} {f'{length:g} m' if length else 'none'}" for file, length in stated.items())
         raise MeshError("point cloud", [f"the files state different units ({text}); give one unit for all"])
-    if len(systems) > 1 and not system:
-        text = ", ".join(f"{name} {system}" for system, name in systems.items())
-        hint = "Transform them to one"
-        raise MeshError("point cloud", [f"the files state different coordinate systems ({text})"], hint)
-    given = system if system.startswith("EPSG:") else crs.strip()
-    if against := [f"{name} {one}" for one, name in systems.items() if system and contradicts(one, given)]:
-        text = f"the files state another coordinate system ({', '.join(against)}) than is given ({system})"
-        raise MeshError("point cloud", [text], "Leave it out, or transform the points, or correct what the files state")
-    notes += [
-        f"{name} states {one}, the map keeps {system} as given"
-        for one, name in systems.items()
-        if system not in ("", one)
-    ]
-    _refuse_units(files, parts, is_stated=bool(stated[files[0]]))
+    notes += _judge_systems(systems, system, crs)
+    refuse_units(files, parts, is_stated=bool(stated[files[0]]))
     origin = _origin(parts)
     for part in parts:
         part -= origin
     cloud = parts[0] if len(parts) == 1 else np.concatenate(parts)
     x, y, z = origin.tolist()
     return PointCloud(cloud, (x, y, z), stated[files[0]] or 1.0, tuple(notes), system or next(iter(systems), ""))
+
+
+def _judge_systems(systems: dict[str, str], given: str, crs: str) -> list[str]:
+    """Refuse coordinate systems that differ or contradict the given one; notes where that is kept instead.
+
+    ``systems`` are those that files state, each with the name of one; ``given`` is that of ``crs``, "" = none.
+    """
+    if not given:
+        if len(systems) > 1:
+            text = ", ".join(f"{name} {system}" for system, name in systems.items())
+            reason = f"the files state different coordinate systems ({text})"
+            raise MeshError("point cloud", [reason], "Transform them to one")
+        return []
+    known = given if given.startswith("EPSG:") else crs.strip()
+    if against := [f"{name} {one}" for one, name in systems.items() if contradicts(one, known)]:
+        text = f"the files state another coordinate system ({', '.join(against)}) than is given ({given})"
+        raise MeshError("point cloud", [text], "Leave it out, or transform the points, or correct what the files state")
+    return [f"{name} states {one}, the map keeps {given} as given" for one, name in systems.items() if one != given]
 
 
 def _read(file: Path, max_points: int, up_axis: str, unit: float) -> tuple[StoredPoints, bool]:
@@ -195,90 +192,6 @@ def _finite(file: Path, points: FloatArray, drop_invalid: bool) -> tuple[FloatAr
     if count == len(points):
         raise MeshError(str(file), ["no point in it is finite"])
     return points[is_finite], [f"{count} points that are not finite are left out"]
-
-
-def _refuse_lost_digits(file: Path, points: FloatArray, single_precision: bool, unit: float) -> None:
-    """Refuse coordinates of a national grid in four-byte floats: a neighbour is half a metre away there."""
-    if not single_precision:
-        return
-    largest = float(np.abs(points).max())
-    step = float(np.spacing(np.float32(largest))) * unit
-    if step > COARSEST_STEP:
-        text = f"coordinates of {largest:.0f} in four-byte floats are only {step:.2g} m exact"
-        raise MeshError(str(file), [text], "Export them as double, or with an offset")
-
-
-def _refuse_mixed_units(file: Path, points: FloatArray) -> None:
-    """Refuse a file with points in metres and in millimetres: those in metres lie in one spot of all, as low as small.
-
-    The spot is three cells wide, each one ``SAME_UNIT_RATIO``th of the extent, with hardly a point around it; the other
-    points are as many times higher. A dense scan in a wide survey has neither.
-    """
-    lower = points[:, :2].min(axis=0)
-    extent = float(np.ptp(points[:, :2], axis=0).max())
-    if extent < SAME_UNIT_RATIO * SHORTEST:
-        return
-    side, columns = extent / SAME_UNIT_RATIO, int(SAME_UNIT_RATIO) + 1
-    cells = np.minimum((points[:, :2] - lower) / side, SAME_UNIT_RATIO).astype(np.int32)
-    counts = np.bincount(cells[:, 0] * columns + cells[:, 1], minlength=columns * columns)
-    distances = np.abs(cells - np.divmod(int(counts.argmax()), columns)).max(axis=1)
-    in_spot = distances <= 1
-    share, around = float(in_spot.mean()), float((distances <= 4).mean())
-    if not MIXED_SHARE <= share <= 1.0 - MIXED_SHARE or around - share > RING_SHARE:
-        return
-    heights = [float(np.ptp(np.percentile(points[chosen, 2], (10.0, 90.0)))) for chosen in (in_spot, ~in_spot)]
-    if heights[1] >= SAME_UNIT_RATIO * heights[0]:
-        text = f"{share:.0%} of its points lie within {3.0 * side:.3g} m, the others are up to {extent:.6g} m apart"
-        raise MeshError(str(file), [f"expected one unit, {text}"], "Bring all of its points to metres first")
-
-
-def _refuse_units(files: Sequence[Path], parts: Sequence[FloatArray], is_stated: bool) -> None:
-    """Refuse extents that no map in metres has."""
-    extents = [float(max(np.ptp(part[:, 0]), np.ptp(part[:, 1]))) for part in parts]
-    shortest, longest = int(np.argmin(extents)), int(np.argmax(extents))
-    if extents[longest] > SAME_UNIT_RATIO * max(extents[shortest], SHORTEST):
-        text = (
-            f"{files[longest].name} is {extents[longest]:.6g} m long, {files[shortest].name} {extents[shortest]:.6g} m"
-        )
-        raise MeshError("point cloud", [f"the files have hardly the same unit: {text}"])
-    _refuse_far_apart(files, parts)
-    lower = np.min([part.min(axis=0) for part in parts], axis=0)
-    upper = np.max([part.max(axis=0) for part in parts], axis=0)
-    length, height = float(max(upper[:2] - lower[:2])), float(upper[2] - lower[2])
-    size = f"{upper[0] - lower[0]:.6g} x {upper[1] - lower[1]:.6g} x {height:.6g} m"
-    if sum(map(len, parts)) == 1:
-        raise MeshError(str(files[0]), ["there is a single point in it, of which no map can be made"])
-    if length == 0.0:
-        raise MeshError(str(files[0]), ["all of its points lie at one place in the plan view"])
-    if is_degrees(lower, upper) and height > 10.0 * length:
-        raise MeshError(str(files[0]), [f"x and y look like degrees ({size}); project them to metres first"])
-    if not is_stated and length > LONGEST:
-        text = f"in metres it is {size}: its unit is hardly the metre"
-        raise MeshError(str(files[0]), [text], "Give the unit, e.g. --scale 0.001 for millimetres")
-    if length < SHORTEST:
-        hint = "" if is_stated else "If its unit is not the metre, give it with --scale"
-        raise MeshError(str(files[0]), [f"it is only {size}, too small for a map"], hint)
-
-
-def _refuse_far_apart(files: Sequence[Path], parts: Sequence[FloatArray]) -> None:
-    """Refuse a file that lies beyond ``LONGEST`` from every other one, as in another coordinate system."""
-    if len(parts) < 2:
-        return
-    lower = np.array([part[:, :2].min(axis=0) for part in parts])
-    upper = np.array([part[:, :2].max(axis=0) for part in parts])
-    for number, file in enumerate(files):
-        gaps = np.maximum(lower - upper[number], lower[number] - upper).max(axis=1)
-        gaps[number] = np.inf
-        nearest = int(np.argmin(gaps))
-        if gaps[nearest] > LONGEST:
-            text = f"{file.name} lies {gaps[nearest]:.6g} m from {files[nearest].name}, expected at most {LONGEST:g} m"
-            hint = "They have hardly the same coordinate system or unit"
-            raise MeshError("point cloud", [text], hint)
-
-
-def is_degrees(lower: FloatArray, upper: FloatArray) -> bool:
-    """Whether the bounds (3,) could be longitudes and latitudes of one region."""
-    return bool(np.abs([lower[0], upper[0]]).max() <= 180.0 and np.abs([lower[1], upper[1]]).max() <= 90.0)
 
 
 def _origin(parts: Sequence[FloatArray]) -> FloatArray:
