@@ -31,10 +31,11 @@ from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.mesh.borders import on_surface
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.search.leg_search import LegQuery, propagate_from, vertex_path_leg
-from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
+from mbf_mesh_nav.tiles.building.build import build_tiles
+from mbf_mesh_nav.tiles.building.sources import HeightSource, open_heights
+from mbf_mesh_nav.tiles.building.tile_settings import TileSettings
 from mbf_mesh_nav.tiles.planning import plan_on_tiles
 from mbf_mesh_nav.tiles.pool import TilePool
-from mbf_mesh_nav.tiles.sources import HeightSource, open_heights
 from mbf_mesh_nav.tiles.tiled_map import KEPT_TILES, TiledMap
 
 SPACING, SEED = 0.5, 11

@@ -26,13 +26,13 @@ from tiles import SETTINGS, SPACING, write_heights
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry
-from mbf_mesh_nav.tiles.build import build_tiles
+from mbf_mesh_nav.tiles.building.build import build_tiles
+from mbf_mesh_nav.tiles.building.sources import HeightSource, open_heights
 from mbf_mesh_nav.tiles.planning import plan_between, plan_on_tiles
 from mbf_mesh_nav.tiles.portals import NOT_CANCELLED
 from mbf_mesh_nav.tiles.serving.corridor_field import CorridorField
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
-from mbf_mesh_nav.tiles.serving.window_settings import window_settings
-from mbf_mesh_nav.tiles.sources import HeightSource, open_heights
+from mbf_mesh_nav.tiles.serving.windows.window_settings import window_settings
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
 WINDOW, POINTS = 40.0, 2000

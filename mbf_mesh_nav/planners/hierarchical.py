@@ -30,13 +30,13 @@ from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner
 from mbf_mesh_nav.mesh.topology import group_of_each
 from mbf_mesh_nav.search.leg_search import Leg
 from mbf_mesh_nav.search.surface_planner import failure_of_leg, named_poses, path_of_legs
-from mbf_mesh_nav.tiles.corridor_search import TiledPlan
 from mbf_mesh_nav.tiles.places import TilePlace
 from mbf_mesh_nav.tiles.planning import SURFACE_DISTANCE, TOLERANCE, place_on_tiles, plan_between
 from mbf_mesh_nav.tiles.serving.corridor_field import CorridorField
 from mbf_mesh_nav.tiles.serving.moment import Moment
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
 from mbf_mesh_nav.tiles.serving.questions import SEARCHED
+from mbf_mesh_nav.tiles.tiled_plan import TiledPlan
 
 AT_VERTEX = 1e-6
 """How far [m] a vertex may be from itself on the surface: rounding."""

@@ -39,9 +39,10 @@ def tile(
         from mbf_mesh_nav.map.map_builder import height_error_of
         from mbf_mesh_nav.map.map_parameters import MeshMapParameters
         from mbf_mesh_nav.server import BARE_MESH
-        from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
-        from mbf_mesh_nav.tiles.cluster_build import BuildOrder, entries_from_cluster
-        from mbf_mesh_nav.tiles.source_files import open_source
+        from mbf_mesh_nav.tiles.building.build import build_tiles
+        from mbf_mesh_nav.tiles.building.cluster_build import BuildOrder, entries_from_cluster
+        from mbf_mesh_nav.tiles.building.source_files import open_source
+        from mbf_mesh_nav.tiles.building.tile_settings import TileSettings
 
         _, checked = read_config_text(BARE_MESH.format(file='""')) if config is None else read_config(config)
         if "mesh_map" not in checked.sections:

@@ -8,10 +8,11 @@ from numpy.typing import ArrayLike
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_mesh_nav.arrays import FlagArray
 from mbf_mesh_nav.mesh.positions import position_text
-from mbf_mesh_nav.tiles.corridor_search import CorridorSearch, TiledPlan, failed_plan
+from mbf_mesh_nav.tiles.corridor_search import CorridorSearch
 from mbf_mesh_nav.tiles.places import TilePlace
 from mbf_mesh_nav.tiles.portals import NOT_CANCELLED
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
+from mbf_mesh_nav.tiles.tiled_plan import TiledPlan, failed_plan
 
 TOLERANCE = 0.03
 """How far above the cheapest path a plan may be, as a share of its cost."""

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.map.layer import CostArray, LethalArray
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.tiles.index import Box, TileIndex, read_index
+from mbf_mesh_nav.tiles.index import Box, read_index
 from mbf_mesh_nav.tiles.places import TilePlace, find_place
 from mbf_mesh_nav.tiles.pool import TilePool
 from mbf_mesh_nav.tiles.portals import PortalGraph, TilePortals, estimated_costs
 from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED, SensedCosts
-from mbf_mesh_nav.tiles.tile import Tile, TileKey, read_tile, read_tile_arrays, tile_file, write_tile
+from mbf_mesh_nav.tiles.stored_tiles import sound_tile
+from mbf_mesh_nav.tiles.tile import Tile, TileKey, read_tile_arrays, tile_file, write_tile
 from mbf_mesh_nav.tiles.tile_graph import TileGraph, costs_between_portals, tile_graph
 
 KEPT_TILES = 4
@@ -244,20 +245,3 @@ class TiledMap:
         if costs.shape != expected:
             raise MeshError(str(path), [f"'portal_costs' has the shape {costs.shape}, expected {expected}"])
         return TilePortals(portals, costs[self._profile_row])
-
-
-def sound_tile(folder: Path, index: TileIndex, key: TileKey) -> Tile:
-    """Read a tile of a map; ``MeshError`` if it is damaged or not of this map."""
-    path, entry = tile_file(folder, key), index.entries[key]
-    tile = read_tile(path)
-    found = (tile.core_vertices, len(tile.neighbours), len(tile.shared), len(tile.costs))
-    expected = (entry.core_vertices, entry.neighbours, entry.shared, len(index.layers))
-    if found != expected or tile.build.tobytes().hex() != index.build:
-        raise MeshError(str(path), ["belongs to another map than the index"])
-    core = tile.vertices[: tile.core_vertices]
-    if (*core.min(axis=0).tolist(), *core.max(axis=0).tolist()) != entry.box:
-        raise MeshError(str(path), ["does not lie where the index states"])
-    if len(tile.portal_costs) != len(index.profiles):
-        reason = f"has costs of {len(tile.portal_costs)} profiles, the index has {len(index.profiles)}"
-        raise MeshError(str(path), [reason])
-    return tile

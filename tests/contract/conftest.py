@@ -21,8 +21,9 @@ from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.plugins import MeshContext
-from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
-from mbf_mesh_nav.tiles.sources import MeshSource
+from mbf_mesh_nav.tiles.building.build import build_tiles
+from mbf_mesh_nav.tiles.building.sources import MeshSource
+from mbf_mesh_nav.tiles.building.tile_settings import TileSettings
 
 RADIUS = 0.2  # m, of the robot
 

@@ -6,8 +6,9 @@ from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
-from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
-from mbf_mesh_nav.tiles.sources import HeightSource
+from mbf_mesh_nav.tiles.building.build import build_tiles
+from mbf_mesh_nav.tiles.building.sources import HeightSource
+from mbf_mesh_nav.tiles.building.tile_settings import TileSettings
 from terrain.recording.run_folder import read_run
 
 SCENARIO = """

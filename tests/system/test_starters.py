@@ -12,8 +12,9 @@ from mbf_abstract.cli import make_app
 from mbf_abstract.commands.starters import starters
 from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
-from mbf_mesh_nav.tiles.sources import HeightSource
+from mbf_mesh_nav.tiles.building.build import build_tiles
+from mbf_mesh_nav.tiles.building.sources import HeightSource
+from mbf_mesh_nav.tiles.building.tile_settings import TileSettings
 from terrain.scenarios.robots import Sensor
 from terrain.scenarios.scenario import PlanarPose, Scenario
 from terrain.scenarios.world_types import GeneratedWorld

@@ -8,8 +8,8 @@ from mbf_abstract.commands.check import Checked
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.tiles.index import INDEX_FILE, is_tile_folder, read_index
+from mbf_mesh_nav.tiles.stored_tiles import sound_tile
 from mbf_mesh_nav.tiles.tile import tile_file
-from mbf_mesh_nav.tiles.tiled_map import sound_tile
 
 EXPECTED = "a sound tile of this map"
 

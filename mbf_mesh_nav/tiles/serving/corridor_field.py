@@ -22,12 +22,13 @@ from mbf_mesh_nav.arrays import FlagArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, follow_predecessors, propagate_distances
 from mbf_mesh_nav.kernels.search.repair_wave import invalidate_subtrees
 from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS
-from mbf_mesh_nav.tiles.corridor_search import STEADY, TiledPlan, plan_along
+from mbf_mesh_nav.tiles.corridor_search import STEADY
 from mbf_mesh_nav.tiles.places import TilePlace
 from mbf_mesh_nav.tiles.planning import plan_between
 from mbf_mesh_nav.tiles.sensed import SensedCosts
 from mbf_mesh_nav.tiles.tile import TileKey
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
+from mbf_mesh_nav.tiles.tiled_plan import TiledPlan, plan_along
 
 
 @dataclass(eq=False)

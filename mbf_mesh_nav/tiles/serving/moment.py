@@ -9,7 +9,7 @@ from mbf_mesh_nav.map.places import MeshPlaces
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED
 from mbf_mesh_nav.tiles.serving.squares import Squares
-from mbf_mesh_nav.tiles.serving.window import Window
+from mbf_mesh_nav.tiles.serving.windows.window import Window
 
 
 class Moment:

@@ -26,8 +26,8 @@ from mbf_mesh_nav.tiles.serving.overview import overview, with_sensed
 from mbf_mesh_nav.tiles.serving.questions import TileQuestions
 from mbf_mesh_nav.tiles.serving.recently_used import RecentlyUsed
 from mbf_mesh_nav.tiles.serving.squares import Squares
-from mbf_mesh_nav.tiles.serving.window import FollowingWindow
-from mbf_mesh_nav.tiles.serving.window_settings import WindowSettings
+from mbf_mesh_nav.tiles.serving.windows.following_window import FollowingWindow
+from mbf_mesh_nav.tiles.serving.windows.window_settings import WindowSettings
 from mbf_mesh_nav.tiles.tile import TileKey
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from mbf_abstract.maps.view import GridView
 from mbf_mesh_nav.arrays import Float32Array, FloatArray
 from mbf_mesh_nav.tiles.sensed import SensedCosts
-from mbf_mesh_nav.tiles.tiled_map import TiledMap, sound_tile
+from mbf_mesh_nav.tiles.stored_tiles import sound_tile
+from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
 MOST_PIXELS = 1000
 """Along the longer side."""

@@ -36,9 +36,9 @@ from mbf_mesh_nav.plugins import MeshController, MeshPlugin, MeshRecovery, MeshR
 from mbf_mesh_nav.tiles.index import is_tile_folder, read_index
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
 from mbf_mesh_nav.tiles.serving.path_refiner import PathRefiner
-from mbf_mesh_nav.tiles.serving.window_controller import WindowController
-from mbf_mesh_nav.tiles.serving.window_recovery import WindowRecovery
-from mbf_mesh_nav.tiles.serving.window_settings import WindowSettings, window_settings
+from mbf_mesh_nav.tiles.serving.windows.window_controller import WindowController
+from mbf_mesh_nav.tiles.serving.windows.window_recovery import WindowRecovery
+from mbf_mesh_nav.tiles.serving.windows.window_settings import WindowSettings, window_settings
 from mbf_mesh_nav.tiles.tiled_map import DEFAULT_MEMORY, TiledMap
 
 BARE_TILES = """\

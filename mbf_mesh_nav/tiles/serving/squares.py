@@ -12,8 +12,9 @@ from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED, SensedCosts
 from mbf_mesh_nav.tiles.serving.recently_used import RecentlyUsed
 from mbf_mesh_nav.tiles.serving.surroundings import Surroundings, mesh_within
+from mbf_mesh_nav.tiles.stored_tiles import sound_tile
 from mbf_mesh_nav.tiles.tile import Tile, TileKey
-from mbf_mesh_nav.tiles.tiled_map import TiledMap, sound_tile
+from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
 CELL = 32.0
 """Side of a square of the grid, in distances between vertices."""

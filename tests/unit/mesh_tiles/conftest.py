@@ -10,8 +10,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from tiled_terrains import SPACING, WholeMap, settings, terrain
 
-from mbf_mesh_nav.tiles.build import build_tiles
-from mbf_mesh_nav.tiles.sources import HeightSource
+from mbf_mesh_nav.tiles.building.build import build_tiles
+from mbf_mesh_nav.tiles.building.sources import HeightSource
 
 
 @pytest.fixture(scope="session")

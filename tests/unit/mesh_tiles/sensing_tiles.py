@@ -9,7 +9,7 @@ from mbf_abstract.maps.sensing import RangeScan
 from mbf_mesh_nav.layers.obstacle import ObstacleParameters
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
-from mbf_mesh_nav.tiles.serving.window_settings import SHOWN, window_settings
+from mbf_mesh_nav.tiles.serving.windows.window_settings import SHOWN, window_settings
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
 SIDE = 16.0

@@ -15,9 +15,9 @@ from mbf_mesh_nav.map.map_builder import build_mesh_map
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.mesh.repair import checked_mesh
-from mbf_mesh_nav.tiles.build import build_tiles
+from mbf_mesh_nav.tiles.building.build import build_tiles
+from mbf_mesh_nav.tiles.building.sources import HeightSource, MeshSource
 from mbf_mesh_nav.tiles.index import INDEX_FILE, CostProfile, read_index
-from mbf_mesh_nav.tiles.sources import HeightSource, MeshSource
 from mbf_mesh_nav.tiles.tile import read_tile, tile_file
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
@@ -94,8 +94,8 @@ heights, folder, last, tests = sys.argv[1:]
 sys.path.insert(0, tests)
 from tiled_terrains import SPACING, settings
 
-from mbf_mesh_nav.tiles.build import build_tiles
-from mbf_mesh_nav.tiles.sources import HeightSource
+from mbf_mesh_nav.tiles.building.build import build_tiles
+from mbf_mesh_nav.tiles.building.sources import HeightSource
 
 def kill(done, total):
     if done == int(last):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from mbf_mesh_nav.mesh.mesh_report import MeshError
+from mbf_mesh_nav.tiles.building.sources import open_heights
 from mbf_mesh_nav.tiles.index import INDEX_FILE, read_index
-from mbf_mesh_nav.tiles.sources import open_heights
 from mbf_mesh_nav.tiles.tile import read_tile, tile_file
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
 

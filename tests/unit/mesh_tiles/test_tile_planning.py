@@ -14,11 +14,12 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.tiles import corridor_search, pool
-from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
+from mbf_mesh_nav.tiles.building.build import build_tiles
+from mbf_mesh_nav.tiles.building.sources import HeightSource, MeshSource
+from mbf_mesh_nav.tiles.building.tile_settings import TileSettings
 from mbf_mesh_nav.tiles.index import CostProfile
 from mbf_mesh_nav.tiles.planning import plan_on_tiles
 from mbf_mesh_nav.tiles.pool import TilePool
-from mbf_mesh_nav.tiles.sources import HeightSource, MeshSource
 from mbf_mesh_nav.tiles.tile import read_tile, tile_file
 from mbf_mesh_nav.tiles.tiled_map import KEPT_TILES, TiledMap
 

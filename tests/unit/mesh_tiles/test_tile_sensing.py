@@ -24,7 +24,7 @@ from mbf_abstract.maps.queries import CellState
 from mbf_mesh_nav.layers.obstacle import ObstacleLayer
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.tiles.serving.window_settings import MOVES_AT
+from mbf_mesh_nav.tiles.serving.windows.window_settings import MOVES_AT
 from mbf_mesh_nav.tiles.tile import tile_file
 
 

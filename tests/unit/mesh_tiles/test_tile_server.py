@@ -24,13 +24,14 @@ from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.hierarchical import HierarchicalPlanner
 from mbf_mesh_nav.plugins import MeshContext
-from mbf_mesh_nav.tiles.build import build_tiles
+from mbf_mesh_nav.tiles.building.build import build_tiles
+from mbf_mesh_nav.tiles.building.sources import HeightSource
 from mbf_mesh_nav.tiles.serving import surroundings
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
 from mbf_mesh_nav.tiles.serving.squares import KEPT_VERTICES
-from mbf_mesh_nav.tiles.sources import HeightSource
+from mbf_mesh_nav.tiles.stored_tiles import sound_tile
 from mbf_mesh_nav.tiles.tile import read_tile, tile_file
-from mbf_mesh_nav.tiles.tiled_map import TiledMap, sound_tile
+from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
 
 @pytest.fixture

@@ -18,12 +18,13 @@ from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.planners.hierarchical import HierarchicalPlanner
-from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
+from mbf_mesh_nav.tiles.building.build import build_tiles
+from mbf_mesh_nav.tiles.building.sources import HeightSource, MeshSource
+from mbf_mesh_nav.tiles.building.tile_settings import TileSettings
 from mbf_mesh_nav.tiles.index import CostProfile, TileEntry, TileIndex
 from mbf_mesh_nav.tiles.serving import navigation_map, squares
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
 from mbf_mesh_nav.tiles.serving.recently_used import RecentlyUsed
-from mbf_mesh_nav.tiles.sources import HeightSource, MeshSource
 from mbf_mesh_nav.tiles.tile import read_tile, tile_file
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
 

@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.tiles import cluster_build
-from mbf_mesh_nav.tiles.build import build_tiles
-from mbf_mesh_nav.tiles.cluster_build import BuildOrder, build_ordered, entries_from_cluster
-from mbf_mesh_nav.tiles.sources import HeightSource
+from mbf_mesh_nav.tiles.building import cluster_build
+from mbf_mesh_nav.tiles.building.build import build_tiles
+from mbf_mesh_nav.tiles.building.cluster_build import BuildOrder, build_ordered, entries_from_cluster
+from mbf_mesh_nav.tiles.building.sources import HeightSource
 from mbf_mesh_nav.tiles.tile import tile_file
 
 pytestmark = pytest.mark.timeout(300)

@@ -7,7 +7,7 @@ from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.mesh.borders import on_surface
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.search.leg_search import LegQuery, propagate_from, vertex_path_leg
-from mbf_mesh_nav.tiles.build import TileSettings
+from mbf_mesh_nav.tiles.building.tile_settings import TileSettings
 
 SPACING = 0.5
 LAYERS = (

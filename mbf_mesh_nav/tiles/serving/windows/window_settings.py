@@ -11,7 +11,7 @@ from mbf_mesh_nav.layers.combinations.max_combination import MaxCombinationLayer
 from mbf_mesh_nav.map.layer import MeshLayer
 from mbf_mesh_nav.map.map_builder import LayerLoader, plan_mesh_layers
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
-from mbf_mesh_nav.tiles.build import reach_of
+from mbf_mesh_nav.tiles.building.tile_settings import reach_of
 from mbf_mesh_nav.tiles.serving.surroundings import StoredLayer
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
 

@@ -13,7 +13,7 @@ from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.mesh.densify import densify
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.mesh.repair import checked_mesh
-from mbf_mesh_nav.tiles.sources import HeightSource, MeshSource, TileSource, open_heights
+from mbf_mesh_nav.tiles.building.sources import HeightSource, MeshSource, TileSource, open_heights
 
 MAX_HEIGHTS = 2**31 - 1
 """Heights of one file."""

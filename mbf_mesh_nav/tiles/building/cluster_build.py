@@ -16,9 +16,10 @@ from pathlib import Path
 
 from mbf_abstract.cluster import run_on_cluster
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.tiles.build import Entries, TileBuilder, TileSettings, entry_of
+from mbf_mesh_nav.tiles.building.build import Entries, TileBuilder, entry_of
+from mbf_mesh_nav.tiles.building.source_files import open_source
+from mbf_mesh_nav.tiles.building.tile_settings import TileSettings
 from mbf_mesh_nav.tiles.index import TileEntry
-from mbf_mesh_nav.tiles.source_files import open_source
 from mbf_mesh_nav.tiles.tile import TileKey, tile_file
 
 

@@ -1,0 +1,1 @@
+"""Building tiled maps: what they are cut from, with what settings, and by which processes."""
