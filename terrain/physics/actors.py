@@ -49,6 +49,20 @@ class Body:
     thing: Thing = Thing.PERSON
     looks: Surface | None = None
 
+    @property
+    def reach(self) -> float:
+        """Radius [m] of a circle around it."""
+        return self.size[0] if len(self.size) == 2 else 0.5 * math.hypot(self.size[0], self.size[1])
+
+    def put_into(self, world: AnyWorld, pose: Pose) -> tuple[int, Surface]:
+        """Put it into a world with its middle at a pose; return its number there and what it looks like."""
+        if len(self.size) == 2:
+            number, looks = world.add_cylinder(pose, *self.size, moving=True), cylinder(*self.size)
+        else:
+            number, looks = world.add_box(pose, self.size, moving=True), box(self.size)
+        world.things[number] = self.thing
+        return number, self.looks or looks
+
 
 PERSON = Body()
 
@@ -95,21 +109,12 @@ class RouteWalker:
         self._world = world
         self._speed = speed
         self._start = start
-        size = body.size
-        self._lift = 0.5 * size[-1]
-        self.reach = size[0] if len(size) == 2 else 0.5 * math.hypot(size[0], size[1])
+        self._lift = 0.5 * body.size[-1]
+        self.thing, self.size, self.reach = body.thing, body.size, body.reach
         self._waited, self._waits = 0.0, False
         self._gives_way = gives_way
         self._robots: Sequence[SimulatedRobot] = ()
-        self.thing, self.size = body.thing, size
-        if len(size) == 2:
-            radius, height = size
-            self.body = world.add_cylinder(self.pose(), radius, height, moving=True)
-            self.looks = body.looks or cylinder(radius, height)
-        else:
-            self.body = world.add_box(self.pose(), size, moving=True)
-            self.looks = body.looks or box(size)
-        world.things[self.body] = body.thing
+        self.body, self.looks = body.put_into(world, self.pose())
         world.before_step(self._move)
 
     def pose(self) -> Pose:

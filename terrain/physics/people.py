@@ -21,7 +21,6 @@ from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from terrain.physics.actors import COURTESY, PERSON, AnyWorld, Body, closed_route
 from terrain.physics.protocols import SimulatedRobot
-from terrain.worlds.surface import cylinder
 from terrain.worlds.wall_clearance import Walls
 
 HORIZON = 4.0  # m; how far a person looks
@@ -118,15 +117,12 @@ class Person:
         self._corners = closed_route(route)
         self._lengths = norm(np.diff(self._corners, axis=0))
         self._world, self._speed, self._walls, self._start = world, speed, walls, start
-        self.thing, self.size = body.thing, body.size
-        self.reach, height = body.size
-        self._lift = 0.5 * height
+        self.thing, self.size, self.reach = body.thing, body.size, body.reach
+        self._lift = 0.5 * body.size[-1]
         self._robots: Sequence[SimulatedRobot] = ()
         self._others: Sequence[Walking] = ()
         self._go_to_start()
-        self.body = world.add_cylinder(self.pose(), self.reach, height, moving=True)
-        self.looks = body.looks or cylinder(self.reach, height)
-        world.things[self.body] = self.thing
+        self.body, self.looks = body.put_into(world, self.pose())
         world.before_step(self._move)
 
     def pose(self) -> Pose:
