@@ -31,7 +31,8 @@ from mbf_mesh_nav.kernels.mesh.topology import (
 from mbf_mesh_nav.kernels.motion.path_costs import way_cost
 from mbf_mesh_nav.kernels.motion.path_poses import poses_along
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, follow_predecessors, propagate_distances
-from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, link_faces, straighten
+from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, link_faces
+from mbf_mesh_nav.kernels.wave.straight_corridors import straighten
 
 
 def kernels() -> list[tuple[Any, tuple[Any, ...]]]:

@@ -8,17 +8,17 @@ call and works on that.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
-from mbf_mesh_nav.map.layer import NOTHING_CHANGED, CostArray, LayerParameters, LethalArray, MeshLayer
-from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerParameters, MeshLayer
+from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.snapshot import MeshSnapshot, SnapshotSeries
 from mbf_mesh_nav.map.snapshot_answers import SnapshotAnswers
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
@@ -26,12 +26,6 @@ from mbf_mesh_nav.mesh.locate import SurfaceLocator
 from mbf_mesh_nav.mesh.mesh_report import MeshReport
 from mbf_mesh_nav.mesh.repair import checked_mesh
 from mbf_mesh_nav.mesh.topology import MeshTopology, build_topology
-
-if TYPE_CHECKING:
-    import networkx
-
-REMEMBERED_CHANGES = 100
-"""Number of changes of the default layer a planner may have missed and still repair its last result."""
 
 
 class MeshMap(SnapshotAnswers):
@@ -60,29 +54,11 @@ class MeshMap(SnapshotAnswers):
         inscribed_radius: float = 0.0,
         locator: SurfaceLocator | None = None,
     ) -> None:
-        super().__init__()
-        self.topology = topology
+        super().__init__(topology, SurfaceLocator(topology) if locator is None else locator)
         self.frame_id = frame_id
         self.inscribed_radius = inscribed_radius
         self.report = report if report is not None else MeshReport()
-        self.locator = SurfaceLocator(topology) if locator is None else locator
-        self.vertices = topology.vertices
-        self.faces = topology.faces
-        self.vertex_normals = topology.vertex_normals
-        self.face_normals = topology.face_normals
-        self.edges = topology.edges
-        self.neighbour_offsets = topology.neighbour_offsets
-        self.neighbours = topology.neighbours
-        self.neighbour_lengths = topology.neighbour_lengths
-        self.vertex_face_offsets = topology.vertex_face_offsets
-        self.vertex_faces = topology.vertex_faces
-        self.face_neighbours = topology.face_neighbours
-        self.components = topology.components
-        self.input_to_internal = topology.input_to_internal
-        self.internal_to_input = topology.internal_to_input
         self._snapshots = SnapshotSeries(topology)
-        self._changes: dict[int, IntArray] = {}  # version -> vertices that differ from the version before
-        self._closed = np.zeros(topology.vertex_count, dtype=np.bool_)  # vertices in places to avoid
         self.set_layers(LayerGraph(), None)
 
     @classmethod
@@ -150,28 +126,13 @@ class MeshMap(SnapshotAnswers):
     def changes_between(self, old_version: int, new_version: int) -> IntArray | None:
         """Vertices whose cost or flag may differ between two snapshots; None if that is not remembered.
 
-        Nor is it if the first is the newer one. The last ``REMEMBERED_CHANGES`` changes of the layers are; new layers
-        or a new edge cost factor begin anew.
+        Nor is it if the first is the newer one. The last ``snapshot.REMEMBERED_CHANGES`` changes of the layers are;
+        new layers or a new edge cost factor begin anew.
         """
         if old_version > new_version:
             return None
         with self._lock:
-            steps = [self._changes.get(version) for version in range(old_version + 1, new_version + 1)]
-        known = [changed for changed in steps if changed is not None]
-        return union_of(known) if len(known) == len(steps) else None
-
-    def to_input_order(self, values: NDArray[Any], missing: float = np.nan) -> NDArray[Any]:
-        """Bring per-vertex values (V, ...) into the caller's numbering; dropped vertices get ``missing``."""
-        result = np.full((len(self.input_to_internal), *values.shape[1:]), missing, dtype=np.float64)
-        kept = self.input_to_internal >= 0
-        result[kept] = values[self.input_to_internal[kept]]
-        return result
-
-    def vertex_graph(self) -> networkx.Graph[int]:
-        """Build the vertex graph for algorithms of your own, see ``vertex_graph.build_vertex_graph``."""
-        from mbf_mesh_nav.mesh.vertex_graph import build_vertex_graph  # networkx takes 0.3 s to import
-
-        return build_vertex_graph(self.topology, self._snapshot.costs, self._snapshot.edge_weights)
+            return self._snapshots.changes_between(old_version, new_version)
 
     # -------------------------------------------------------------------------------------------------- layers
     def set_layers(self, layers: LayerGraph, default_layer: str | None, edge_cost_factor: float = 0.0) -> None:
@@ -198,8 +159,7 @@ class MeshMap(SnapshotAnswers):
             costs = np.zeros(count, np.float32) if shown is None else shown.costs
             lethal = np.zeros(count, np.bool_) if shown is None else shown.lethal
             costs.flags.writeable = lethal.flags.writeable = False  # as those of a layer: kernels know one type
-            self._changes.clear()
-            self._snapshot = self._snapshots.begin(costs, self._with_closed(lethal), edge_cost_factor)
+            self._snapshot = self._snapshots.begin(costs, lethal, edge_cost_factor)
 
     def set_edge_cost_factor(self, edge_cost_factor: float) -> None:
         """Change how much costs lengthen edges, at run time.
@@ -257,7 +217,7 @@ class MeshMap(SnapshotAnswers):
 
     def avoid(self, places: Sequence[AvoidedPlace]) -> None:
         """Make the vertices of these discs lethal, and of no others; each disc lies on the storey of its centre."""
-        closed = np.zeros_like(self._closed)
+        closed = np.zeros(self.topology.vertex_count, dtype=np.bool_)
         for place in places:
             spot = self.locate_one(place.centre.position, place.radius)
             if spot is not None:
@@ -265,29 +225,14 @@ class MeshMap(SnapshotAnswers):
                 nearest = int(self.faces[spot.face, np.argmax(spot.barycentric)])
                 closed[vertices_in_disc(*graph, nearest, spot.point, float(place.radius))] = True
         with self._lock:
-            changed = np.flatnonzero(closed != self._closed).astype(np.int32)
-            self._closed = closed
+            changed = self._snapshots.close(closed)
             if len(changed):
                 now = self._snapshot if self.default_layer is None else self.layers[self.default_layer]
-                self._show(now.costs, now.lethal, changed)
-
-    def _with_closed(self, lethal: LethalArray) -> LethalArray:
-        """The lethal vertices (V,) of a layer and those that are closed."""
-        if not self._closed.any():
-            return lethal
-        both = lethal | self._closed
-        both.flags.writeable = False  # as those of a layer: kernels know one type
-        return both
+                self._snapshot = self._snapshots.follow(now.costs, now.lethal, changed)
 
     def _publish(self, changed: dict[str, IntArray]) -> None:
         """Make the snapshot that follows a change of the default layer; only edges at changed vertices are touched."""
         if self.default_layer not in changed:
             return
         layer, vertices = self.layers[self.default_layer], changed[self.default_layer]
-        self._show(layer.costs, layer.lethal, vertices)
-
-    def _show(self, costs: CostArray, lethal: LethalArray, vertices: IntArray) -> None:
-        """Make the snapshot that differs from the last one at some vertices only."""
-        self._snapshot = self._snapshots.follow(costs, self._with_closed(lethal), vertices)
-        self._changes[self._snapshot.version] = vertices
-        self._changes.pop(self._snapshot.version - REMEMBERED_CHANGES, None)
+        self._snapshot = self._snapshots.follow(layer.costs, layer.lethal, vertices)

@@ -19,7 +19,11 @@ from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.kernels.layers.edge_weights import show_changes
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK
 from mbf_mesh_nav.map.layer import CostArray, LethalArray
+from mbf_mesh_nav.map.layer_graph import union_of
 from mbf_mesh_nav.mesh.topology import MeshTopology
+
+REMEMBERED_CHANGES = 100
+"""Number of changes of the default layer a planner may have missed and still repair its last result."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,11 +87,12 @@ class _Arrays:
     """Arrays that are shown by one snapshot after the other."""
 
     def __init__(self, costs: CostArray, lethal: LethalArray, edge_weights: CostArray) -> None:
-        self.costs, self.lethal, self.edge_weights = costs, lethal, edge_weights
+        self.arrays = costs, lethal, edge_weights
         self._loan: Callable[[], _Loan | None] = lambda: None
 
     def copy(self) -> _Arrays:
-        return _Arrays(self.costs.copy(), self.lethal.copy(), self.edge_weights.copy())
+        costs, lethal, edge_weights = self.arrays
+        return _Arrays(costs.copy(), lethal.copy(), edge_weights.copy())
 
     def is_held(self) -> bool:
         """Whether anything still refers to the last snapshot of these arrays, or any part of it."""
@@ -97,9 +102,7 @@ class _Arrays:
         """Make the snapshot of what the arrays are now."""
         loan = _Loan()
         self._loan = weakref.ref(loan)
-        costs, lethal, weights = (
-            np.asarray(_Lent(part, loan)) for part in (self.costs, self.lethal, self.edge_weights)
-        )
+        costs, lethal, weights = (np.asarray(_Lent(part, loan)) for part in self.arrays)
         return MeshSnapshot(version, costs, lethal, weights, edge_cost_factor)
 
 
@@ -112,12 +115,15 @@ class SnapshotSeries:
         self._current: _Arrays
         self._spare: _Arrays | None = None
         self._missed: IntArray  # vertices that changed since the spare arrays were current
+        self._changes: dict[int, IntArray] = {}  # version -> vertices that differ from the version before
+        self._closed = np.zeros(topology.vertex_count, dtype=np.bool_)  # vertices in places to avoid
 
     def begin(self, costs: CostArray, lethal: LethalArray, edge_cost_factor: float) -> MeshSnapshot:
         """Make a snapshot that has nothing to do with the one before; costs (V,), lethal (V,), see ``MeshSnapshot``."""
         self._edge_cost_factor = edge_cost_factor
         weights = np.zeros(len(self._topology.neighbours), np.float32)
         self._current, self._spare = _Arrays(costs.copy(), lethal.copy(), weights), None
+        self._changes.clear()
         return self._published(costs, lethal, np.arange(len(costs), dtype=np.int32))
 
     def follow(self, costs: CostArray, lethal: LethalArray, changed: IntArray) -> MeshSnapshot:
@@ -128,13 +134,31 @@ class SnapshotSeries:
         else:
             outdated = np.concatenate([self._missed, changed])
         self._current, self._spare, self._missed = arrays, last, changed
-        return self._published(costs, lethal, outdated)
+        snapshot = self._published(costs, lethal, outdated)
+        self._changes[snapshot.version] = changed
+        self._changes.pop(snapshot.version - REMEMBERED_CHANGES, None)
+        return snapshot
+
+    def changes_between(self, old_version: int, new_version: int) -> IntArray | None:
+        """Vertices that ``follow`` was given between two versions; None if some are not remembered."""
+        steps = [self._changes.get(version) for version in range(old_version + 1, new_version + 1)]
+        known = [changed for changed in steps if changed is not None]
+        return union_of(known) if len(known) == len(steps) else None
+
+    def close(self, closed: LethalArray) -> IntArray:
+        """Make the vertices of a mask (V,) lethal in the snapshots to come; return those that were not, or no more."""
+        changed = np.flatnonzero(closed != self._closed).astype(np.int32)
+        self._closed = closed
+        return changed
 
     def _published(self, costs: CostArray, lethal: LethalArray, outdated: IntArray) -> MeshSnapshot:
         """Bring the current arrays up to date at the ``outdated`` vertices and show them."""
+        if self._closed.any():
+            lethal = lethal | self._closed
+            lethal.flags.writeable = False  # as those of a layer: kernels know one type
         mesh, now = self._topology, self._current
         graph = (mesh.neighbour_offsets, mesh.neighbours, mesh.neighbour_lengths)
         factor = float(self._edge_cost_factor)
-        show_changes(*graph, costs, lethal, factor, outdated, now.costs, now.lethal, now.edge_weights)
+        show_changes(*graph, costs, lethal, factor, outdated, *now.arrays)
         self._version += 1
         return now.show(self._version, factor)

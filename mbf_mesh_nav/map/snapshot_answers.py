@@ -6,9 +6,10 @@ No lock is held while a question is answered.
 from __future__ import annotations
 
 from abc import abstractmethod
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.navigation_map import PlaceCheck
@@ -21,6 +22,9 @@ from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
 from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE, UNKNOWN_RADIUS, forbidden_ahead, nearest_of
 from mbf_mesh_nav.mesh.topology import MeshTopology
 from mbf_mesh_nav.mesh.turning import pivots, slope_at, swept_obstacle
+
+if TYPE_CHECKING:
+    import networkx
 
 FORBIDDEN_COST = 1.0
 """Ground whose cost reaches this is not driven onto in a recovery, but along the robot's own track."""
@@ -44,14 +48,44 @@ class SnapshotAnswers(OutlinedMap):
         Steeper ground [rad] is not turned on in a recovery.
     """
 
-    topology: MeshTopology
-    locator: SurfaceLocator
     inscribed_radius: float = 0.0
     max_turning_slope: float = 0.35
+
+    def __init__(self, topology: MeshTopology, locator: SurfaceLocator) -> None:
+        super().__init__()
+        self.topology, self.locator = topology, locator
+        self.vertices = topology.vertices
+        self.faces = topology.faces
+        self.vertex_normals = topology.vertex_normals
+        self.face_normals = topology.face_normals
+        self.edges = topology.edges
+        self.neighbour_offsets = topology.neighbour_offsets
+        self.neighbours = topology.neighbours
+        self.neighbour_lengths = topology.neighbour_lengths
+        self.vertex_face_offsets = topology.vertex_face_offsets
+        self.vertex_faces = topology.vertex_faces
+        self.face_neighbours = topology.face_neighbours
+        self.components = topology.components
+        self.input_to_internal = topology.input_to_internal
+        self.internal_to_input = topology.internal_to_input
 
     @abstractmethod
     def snapshot(self) -> MeshSnapshot:
         """Return the current state; cheap, call it once per plan or control cycle."""
+
+    def to_input_order(self, values: NDArray[Any], missing: float = np.nan) -> NDArray[Any]:
+        """Bring per-vertex values (V, ...) into the caller's numbering; dropped vertices get ``missing``."""
+        result = np.full((len(self.input_to_internal), *values.shape[1:]), missing, dtype=np.float64)
+        kept = self.input_to_internal >= 0
+        result[kept] = values[self.input_to_internal[kept]]
+        return result
+
+    def vertex_graph(self) -> networkx.Graph[int]:
+        """Build the vertex graph for algorithms of your own, see ``vertex_graph.build_vertex_graph``."""
+        from mbf_mesh_nav.mesh.vertex_graph import build_vertex_graph  # networkx takes 0.3 s to import
+
+        snapshot = self.snapshot()
+        return build_vertex_graph(self.topology, snapshot.costs, snapshot.edge_weights)
 
     def locate(self, points: ArrayLike, max_distance: float = np.inf) -> Location:
         """Nearest surface points of many points, see ``SurfaceLocator.locate``."""

@@ -8,8 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
+from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,3 +81,18 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Lengths (F, 3) [m] of the edges from corner k to corner k+1."""
     x, y, z = (column[faces] - column[np.roll(faces, -1, axis=1)] for column in np.ascontiguousarray(vertices.T))
     return np.asarray(np.sqrt(x * x + y * y + z * z))
+
+
+def shaped_arrays(vertices: ArrayLike, faces: ArrayLike, file: str) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Vertices (V, 3) and faces (F, 3) of a caller, of any index; MeshError if they are no such arrays."""
+    points, corners = np.asarray(vertices), np.asarray(faces)
+    reasons = []
+    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "fiu":
+        reasons.append(f"vertices must be a (V, 3) array of numbers, got {points.shape} {points.dtype}")
+    if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu":
+        reasons.append(f"faces must be a (F, 3) array of integers, got {corners.shape} {corners.dtype}")
+    elif len(corners) == 0:
+        reasons.append("there is no face")
+    if reasons:
+        raise MeshError(file, reasons)
+    return points.astype(np.float64), corners.astype(np.int64)

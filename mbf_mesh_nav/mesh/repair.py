@@ -26,7 +26,7 @@ from mbf_mesh_nav.kernels.mesh.defects import (
     winding_flips,
 )
 from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges
-from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
+from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh, shaped_arrays
 from mbf_mesh_nav.mesh.mesh_report import Finding, MeshError, MeshReport
 from mbf_mesh_nav.mesh.slivers import without_slivers
 from mbf_mesh_nav.mesh.topology import faces_of_vertices, group_of_each
@@ -82,7 +82,7 @@ def checked_mesh(
     """
     if unknown := [name for name in repair if name not in REPAIRS]:
         raise MeshError(file, [f"unknown repair '{name}', the repairs are: {', '.join(REPAIRS)}" for name in unknown])
-    points, corners = _shaped(vertices, faces, file)
+    points, corners = shaped_arrays(vertices, faces, file)
     check = _Check(repair, join_distance)
     mesh = check.indices(points, corners)
     mesh = check.duplicate_vertices(mesh)
@@ -102,23 +102,8 @@ def checked_mesh(
 
 def _repair_hint(report: MeshReport, repair: Sequence[str]) -> str:
     """How to allow the repairs that a refused mesh needs."""
-    needed = [finding.name for finding in report.refusals]
-    listed = ", ".join([*repair, *(name for name in needed if name not in repair)])
+    listed = ", ".join(dict.fromkeys([*repair, *(finding.name for finding in report.refusals)]))
     return f"To have it repaired when it is loaded, configure mesh_map: {{repair: [{listed}]}}"
-
-
-def _shaped(vertices: ArrayLike, faces: ArrayLike, file: str) -> tuple[FloatArray, NDArray[np.int64]]:
-    points, corners = np.asarray(vertices), np.asarray(faces)
-    reasons = []
-    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "fiu":
-        reasons.append(f"vertices must be a (V, 3) array of numbers, got {points.shape} {points.dtype}")
-    if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu":
-        reasons.append(f"faces must be a (F, 3) array of integers, got {corners.shape} {corners.dtype}")
-    elif len(corners) == 0:
-        reasons.append("there is no face")
-    if reasons:
-        raise MeshError(file, reasons)
-    return points.astype(np.float64), corners.astype(np.int64)
 
 
 class _Check:
@@ -144,8 +129,7 @@ class _Check:
         if len(indices):
             text = text.format(count=len(indices))
             repaired = always_repaired or name in self.repair
-            finding = Finding(name, text, indices.astype(np.int64), repaired, harmless)
-            self.report.findings.append(finding)
+            self.report.findings.append(Finding(name, text, indices.astype(np.int64), repaired, harmless))
 
     def indices(self, points: FloatArray, corners: NDArray[np.int64]) -> CheckedMesh:
         identity = np.arange(len(points), dtype=np.int32)

@@ -8,7 +8,8 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, FloatArray, IntArray
 from mbf_mesh_nav.kernels.wave.corridor_detours import pass_vertices
-from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, link_faces, straighten
+from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, link_faces
+from mbf_mesh_nav.kernels.wave.straight_corridors import straighten
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.search.path_cost import cost_along

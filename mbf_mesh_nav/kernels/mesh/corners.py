@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_mesh_nav.arrays import FlagArray, Float32Array, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 
 
@@ -70,3 +70,12 @@ def slot_of(neighbour_offsets: IntArray, neighbours: IntArray, vertex: int, othe
     for entry in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
         slot += Index(Index(neighbours[entry]) < other)
     return slot  # type: ignore[no-any-return]
+
+
+@inner_kernel
+def corner_of(corners: IntArray, vertex: int) -> int:
+    """Number of a vertex among the corners of a face, -1 if it is none of them."""
+    for corner in range(3):
+        if corners[corner] == vertex:
+            return Count(corner)  # type: ignore[no-any-return]
+    return Count(-1)  # type: ignore[no-any-return]

@@ -9,6 +9,7 @@ the path ahead). A step into a forbidden face or over a border ends the rollout 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,21 +24,48 @@ PATH, COST, TILT, TURN, GOAL, HEADING = range(6)
 """Positions of the critics in the weights array."""
 
 
+class SurfacePose(NamedTuple):
+    """Where a robot stands: a face, a point [m] and its heading, a unit vector, in it."""
+
+    face: int
+    point: Vector
+    heading: Vector
+
+
+class PathAhead(NamedTuple):
+    """The path ahead.
+
+    Attributes
+    ----------
+    points, remaining : (m, 3), (m,) float64
+        Evenly sampled, and the path length [m] left from each point.
+    facing : float
+        1 where the robot looks along the path, -1 where it drives it backward.
+    """
+
+    points: FloatArray
+    remaining: FloatArray
+    facing: float
+
+
+class Critics(NamedTuple):
+    """Weights (6,) float64 in the order of this module's constants, and the roll and the pitch [rad] that cost 1."""
+
+    weights: FloatArray
+    roll_limit: float
+    pitch_limit: float
+
+
 @kernel
 def score_rollouts(
     surface: Surface,
     costs: Float32Array,
     ranks: Float32Array,
-    start_face: int,
-    start: Vector,
-    heading: Vector,
+    start: SurfacePose,
     controls: FloatArray,
     period: float,
-    path_points: FloatArray,
-    remaining: FloatArray,
-    weights: FloatArray,
-    tilt_limits: tuple[float, float],
-    facing: float,
+    path: PathAhead,
+    critics: Critics,
     poses: Float32Array,
 ) -> tuple[FloatArray, BoolArray]:
     """Score every sequence of ``controls``.
@@ -47,20 +75,12 @@ def score_rollouts(
     costs, ranks : (V,) float32
         The current map; ``forbidden_surface.py`` defines the rank of forbidden surface and where a rollout
         that starts there may go.
-    start_face, start, heading
-        The robot: face, point [m], unit direction in the face.
+    start : SurfacePose
+        The robot.
     controls : (n, t, 2) float64
         Forward speed [m/s] and yaw rate [rad/s] per step.
     period : float
         Length of a step [s].
-    path_points, remaining : (m, 3), (m,) float64
-        The path ahead, evenly sampled, and the path length [m] left from each point.
-    weights : (6,) float64
-        Of the critics, in the order of this module's constants.
-    tilt_limits : (float, float)
-        Roll and pitch [rad] that cost 1 each.
-    facing : float
-        1 where the robot looks along the path, -1 where it drives it backward.
     poses : (3, t, n) float32
         Filled with x, y [m] relative to the start and yaw [rad], seen from above, after each step, a rollout that
         collides staying where it does. Without steps, (3, 0, n), nothing is filled.
@@ -76,9 +96,11 @@ def score_rollouts(
     sequence_count, step_count, _ = controls.shape
     scores = np.empty(sequence_count, dtype=np.float64)
     collided = np.zeros(sequence_count, dtype=np.bool_)
-    sin_roll, sin_pitch = math.sin(tilt_limits[0]), math.sin(tilt_limits[1])
+    path_points, remaining, facing = path
+    weights, roll_limit, pitch_limit = critics
+    sin_roll, sin_pitch = math.sin(roll_limit), math.sin(pitch_limit)
     for sequence in range(sequence_count):
-        face, point, direction = start_face, start, heading
+        face, point, direction = start
         stands_on = rank_at(vertices, faces, ranks, face, point)
         nearest = Count(0)
         score = 0.0
@@ -95,9 +117,9 @@ def score_rollouts(
             comes_to = rank_at(vertices, faces, ranks, face, point)
             if walked < distance - 1e-9 or not may_enter(stands_on, comes_to):
                 collided[sequence] = True
-                _note(poses, sequence, Count(step), Count(step_count), difference(point, start), direction)
+                _note(poses, sequence, Count(step), Count(step_count), difference(point, start.point), direction)
                 break
-            _note(poses, sequence, Count(step), Count(step + 1), difference(point, start), direction)
+            _note(poses, sequence, Count(step), Count(step + 1), difference(point, start.point), direction)
             stands_on = comes_to
             # 3. The path point nearest to here is at or after the one of the step before.
             gap = _squared_distance(path_points, nearest, point)

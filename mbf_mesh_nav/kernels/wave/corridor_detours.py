@@ -9,15 +9,10 @@ from __future__ import annotations
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, kernel
+from mbf_mesh_nav.kernels.mesh.corners import corner_of
 from mbf_mesh_nav.kernels.mesh.vectors import Vector
-from mbf_mesh_nav.kernels.wave.corridors import (
-    FreeFaces,
-    corner_of,
-    other_side,
-    path_length,
-    straighten,
-    turned_corridor,
-)
+from mbf_mesh_nav.kernels.wave.corridors import FreeFaces
+from mbf_mesh_nav.kernels.wave.straight_corridors import other_side, path_length, straighten, turned_corridor
 
 _SHORTER = 1.0 - 1e-6
 """Only what makes a path shorter by more than rounding is another path."""

@@ -17,10 +17,10 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
-from mbf_mesh_nav.kernels.mesh.corners import slot_of
 from mbf_mesh_nav.kernels.mesh.surface import Surface
-from mbf_mesh_nav.kernels.mesh.vectors import Vector, between, cross, difference, dot, norm, row, set_row
+from mbf_mesh_nav.kernels.mesh.vectors import Vector, between, row, set_row
 from mbf_mesh_nav.kernels.wave.fronts import NO_BEND, SLACK
+from mbf_mesh_nav.kernels.wave.weighted_faces import barycentric, on_side, side_weights, weighted_length
 
 _ON_VERTEX = 1e-6  # a crossing this near (as a share of the edge) to a vertex is the vertex
 _NO_SIDE = -1
@@ -67,7 +67,7 @@ def trace_descent(
     vertices, faces = surface.vertices, surface.faces
     passed = np.zeros(len(faces), dtype=np.bool_)
     face, vertex = Count(start_face), Count(-1)
-    place = _barycentric(vertices, faces[face], start)
+    place = barycentric(vertices, faces[face], start)
     set_row(points, Count(0), start)
     point_faces[0] = face
     count = Count(1)
@@ -97,7 +97,7 @@ def trace_descent(
         else:
             set_row(points, count, between(row(vertices, left), row(vertices, right), share))
             face = Count(surface.face_neighbours[face, side])
-            place = _on_side(_side_of(faces[face], right), 1.0 - share)
+            place = on_side(_side_of(faces[face], right), 1.0 - share)
         count += 1
 
 
@@ -123,53 +123,6 @@ def _side_of(corners: IntArray, vertex: int) -> int:
 
 
 @inner_kernel
-def _on_side(side: int, share: float) -> Vector:
-    """Barycentric coordinates of a point on a side, at a share of it from its first corner."""
-    first = 1.0 - share
-    if side == 0:
-        return first, share, 0.0
-    return (0.0, first, share) if side == 1 else (share, 0.0, first)
-
-
-@inner_kernel
-def _barycentric(vertices: FloatArray, corners: IntArray, point: Vector) -> Vector:
-    """Barycentric coordinates of a point in the plane of a face."""
-    a, b, c = row(vertices, Count(corners[0])), row(vertices, Count(corners[1])), row(vertices, Count(corners[2]))
-    normal = cross(difference(b, a), difference(c, a))
-    squared = max(dot(normal, normal), 1e-300)
-    second = dot(cross(difference(point, a), difference(c, a)), normal) / squared
-    third = dot(cross(difference(b, a), difference(point, a)), normal) / squared
-    return 1.0 - second - third, second, third
-
-
-@inner_kernel
-def _side_weights(surface: Surface, edge_weights: Float32Array, corners: IntArray) -> Vector:
-    """Weights [m] of the sides of a face, that from corner k to the next at k; the length at a blocked corner."""
-    return (
-        _weight(surface, edge_weights, Count(corners[0]), Count(corners[1])),
-        _weight(surface, edge_weights, Count(corners[1]), Count(corners[2])),
-        _weight(surface, edge_weights, Count(corners[2]), Count(corners[0])),
-    )
-
-
-@inner_kernel
-def _weight(surface: Surface, edge_weights: Float32Array, a: int, b: int) -> float:
-    weight = float(edge_weights[slot_of(surface.neighbour_offsets, surface.neighbours, a, b)])
-    return weight if weight < np.inf else norm(difference(row(surface.vertices, a), row(surface.vertices, b)))
-
-
-@inner_kernel
-def _weighted_length(sides: Vector, step: Vector) -> float:
-    """Length [m] of a step, a difference of barycentric coordinates, in the plane of a triangle of weighted sides."""
-    squared = (
-        step[0] * step[1] * sides[0] * sides[0]
-        + step[1] * step[2] * sides[1] * sides[1]
-        + step[2] * step[0] * sides[2] * sides[2]
-    )
-    return math.sqrt(max(-squared, 0.0))
-
-
-@inner_kernel
 def _way_through(
     surface: Surface, field: Field, goal_face: int, passed: BoolArray, face: int, place: Vector, over_corner: bool
 ) -> tuple[float, int, float, int]:
@@ -179,12 +132,12 @@ def _way_through(
     reached, only the others count.
     """
     corners, distances = surface.faces[face], field.distances
-    sides = _side_weights(surface, field.edge_weights, corners)
+    sides = side_weights(surface, field.edge_weights, corners)
     best, best_side, best_share, best_vertex = np.inf, Count(_NO_SIDE), 0.0, Count(-1)
     lengths = (
-        _weighted_length(sides, (place[0] - 1.0, place[1], place[2])),
-        _weighted_length(sides, (place[0], place[1] - 1.0, place[2])),
-        _weighted_length(sides, (place[0], place[1], place[2] - 1.0)),
+        weighted_length(sides, (place[0] - 1.0, place[1], place[2])),
+        weighted_length(sides, (place[0], place[1] - 1.0, place[2])),
+        weighted_length(sides, (place[0], place[1], place[2] - 1.0)),
     )
     for corner in range(3):
         total = distances[corners[corner]] + lengths[corner]
@@ -259,7 +212,7 @@ def _way_from_vertex(
         if not _is_reached(corners, distances):
             continue
         own = _side_of(corners, vertex)
-        sides = _side_weights(surface, field.edge_weights, corners)
+        sides = side_weights(surface, field.edge_weights, corners)
         for step in range(1, 3):
             other = Count(corners[(own + step) % 3])
             total = distances[other] + (sides[own] if step == 1 else sides[(own + 2) % 3])

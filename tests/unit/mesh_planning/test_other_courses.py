@@ -11,7 +11,8 @@ from pygeodesic import geodesic
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
 from mbf_mesh_nav.kernels.wave.corridor_detours import pass_vertices
-from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, link_faces, straighten
+from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, link_faces
+from mbf_mesh_nav.kernels.wave.straight_corridors import straighten
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner

@@ -9,7 +9,8 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_abstract.time.cancel import CancelToken
-from mbf_mesh_nav.map.mesh_map import REMEMBERED_CHANGES, MeshMap
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.snapshot import REMEMBERED_CHANGES
 from mbf_mesh_nav.planners.repairing import RepairingPlanner
 
 REQUEST = PlanRequest(Pose.planar(0.31, 0.27), Pose.planar(3.72, 3.58))

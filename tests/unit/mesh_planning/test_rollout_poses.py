@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned, walk
-from mbf_mesh_nav.kernels.motion.mppi import score_rollouts
+from mbf_mesh_nav.kernels.motion.mppi import Critics, PathAhead, SurfacePose, score_rollouts
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
 PERIOD = 0.1
@@ -32,8 +32,8 @@ def rolled_out(mesh_map, begin, yaw, controls, steps):
     poses = np.full((3, steps, len(controls)), np.nan, dtype=np.float32)
     scores, collided = score_rollouts(
         mesh_map.topology.surface, np.zeros(len(mesh_map.vertices), dtype=np.float32), ranks,
-        spot.face, tuple(map(float, spot.point)), heading,
-        controls, PERIOD, path, np.linspace(3.0, 0.0, 30), np.ones(6), (0.4, 0.5), 1.0, poses,
+        SurfacePose(spot.face, tuple(map(float, spot.point)), heading), controls, PERIOD,
+        PathAhead(path, np.linspace(3.0, 0.0, 30), 1.0), Critics(np.ones(6), 0.4, 0.5), poses,
     )  # fmt: skip
     return (spot, heading), scores, collided, poses
 

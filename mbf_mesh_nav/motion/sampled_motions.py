@@ -1,0 +1,120 @@
+"""The motions that ``mesh.mppi`` tries: sampled controls, and what they make a robot of its motion model do."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from mbf_abstract.geometry import AckermannCommand, Command, Twist
+from mbf_abstract.geometry.arithmetic import tan
+from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.motion.goal_approach import clamp
+
+_NOISE_HOLD = 3  # steps a noise value is kept for: explores further than independent noise of the same size
+
+
+class MPPIParameters(PluginParameters):
+    """Parameters of ``mesh.mppi``."""
+
+    motion_model: Literal["differential", "ackermann"] = parameter("differential", "How the robot moves.")
+    batch_size: int = parameter(400, "Motions tried in a cycle.", ge=10, le=10000)
+    time_steps: int = parameter(30, "Steps of a motion.", ge=5, le=200)
+    model_dt: float = parameter(0.1, "Length of a step.", unit="s", gt=0.0, le=1.0)
+    temperature: float = parameter(0.15, "How much worse a motion may be and still count.", gt=0.0)
+    max_vel_x: float = parameter(0.8, "Forward speed limit.", unit="m/s", gt=0.0, le=5.0)
+    min_vel_x: float = parameter(0.0, "Least forward speed; negative allows reversing.", unit="m/s", le=0.0)
+    max_vel_theta: float = parameter(1.0, "Yaw rate limit, in both directions.", unit="rad/s", gt=0.0, le=5.0)
+    wheelbase: float = parameter(0.5, "Distance of the axles (Ackermann).", unit="m", gt=0.0)
+    max_steering_angle: float = parameter(0.5, "Steering limit (Ackermann).", unit="rad", gt=0.0, lt=1.5)
+    vx_std: float = parameter(0.25, "Standard deviation of the speed samples.", unit="m/s", gt=0.0)
+    wz_std: float = parameter(0.5, "Standard deviation of yaw rate (or steering) samples.", gt=0.0)
+    decel_lim_x: float = parameter(0.4, "Deceleration planned before the goal.", unit="m/s^2", gt=0.0)
+    path_weight: float = parameter(3.0, "Weight of the squared distance to the path.", ge=0.0)
+    cost_weight: float = parameter(2.0, "Weight of the map's cost.", ge=0.0)
+    tilt_weight: float = parameter(0.5, "Weight of roll and pitch over their limits, squared.", ge=0.0)
+    turn_weight: float = parameter(0.05, "Weight of the squared yaw rate.", ge=0.0)
+    goal_weight: float = parameter(2.0, "Weight of the path length left.", ge=0.0)
+    heading_weight: float = parameter(0.5, "Weight of looking away from the path ahead.", ge=0.0)
+    roll_limit: float = parameter(0.4, "Roll that counts 1.", unit="rad", gt=0.0, le=1.5)
+    pitch_limit: float = parameter(0.5, "Pitch that counts 1.", unit="rad", gt=0.0, le=1.5)
+    cost_limit: float = parameter(1.0, "Vertices whose cost reaches this are impassable.", gt=0.0, allow_inf=True)
+    goal_distance: float = parameter(
+        0.1, "Nearer to the goal than this the robot only turns to the final heading.", unit="m", gt=0.0
+    )
+    max_path_distance: float = parameter(2.0, "Farther from the path than this it is missed.", unit="m", gt=0.0)
+    max_surface_distance: float = parameter(
+        1.0, "Farther from the surface than this the robot is out of the map.", unit="m", gt=0.0
+    )
+    moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
+
+
+@dataclass(frozen=True)
+class SampledMotions:
+    """Controls and the motions they make: speed [m/s] and yaw rate [rad/s], or the steering angle [rad] of a car.
+
+    Attributes
+    ----------
+    min_turning_radius : float
+        Of the robot's tightest curve [m]; 0 = unknown.
+    """
+
+    parameters: MPPIParameters
+    min_turning_radius: float
+
+    @property
+    def steering_limit(self) -> float:
+        """Largest steering angle [rad]: as configured, and no curve tighter than the robot's."""
+        p = self.parameters
+        if self.min_turning_radius == 0.0:
+            return p.max_steering_angle
+        return min(p.max_steering_angle, math.atan(p.wheelbase / self.min_turning_radius))
+
+    @property
+    def turning_radius(self) -> float:
+        """Radius [m] of a car's tightest curve."""
+        return self.parameters.wheelbase / math.tan(self.steering_limit)
+
+    def sampled(
+        self, rng: np.random.Generator, nominal: FloatArray, max_speed: float, remaining: float, *, reverses: bool
+    ) -> FloatArray:
+        """Controls (batch_size, time_steps, 2) around ``nominal``; the first are those, the second stand still.
+
+        No robot that can turn where it stands goes on past the goal, ``remaining`` [m] away: motions that run beyond it
+        would speak for creeping there.
+        """
+        p = self.parameters
+        held = -(-p.time_steps // _NOISE_HOLD)
+        # Two parts: one that changes, and one that lasts; only lasting turns lead round an obstacle.
+        noise = rng.standard_normal((p.batch_size, held, 2)) + rng.standard_normal((p.batch_size, 1, 2))
+        noise *= (p.vx_std, p.wz_std)
+        noise = np.repeat(noise, _NOISE_HOLD, axis=1)[:, : p.time_steps]
+        noise[0] = 0.0
+        controls = nominal + noise
+        controls[1] = 0.0
+        slowest = max(p.min_vel_x, -max_speed) if reverses else p.min_vel_x
+        np.clip(controls[..., 0], slowest, max_speed, out=controls[..., 0])
+        if p.motion_model == "differential":
+            before = np.cumsum(controls[..., 0], axis=1) - controls[..., 0]
+            room = np.maximum(remaining / p.model_dt - before, 0.0)
+            np.minimum(controls[..., 0], room, out=controls[..., 0])
+        turn_limit = p.max_vel_theta if p.motion_model == "differential" else self.steering_limit
+        np.clip(controls[..., 1], -turn_limit, turn_limit, out=controls[..., 1])
+        return np.asarray(controls)
+
+    def driven(self, controls: FloatArray) -> FloatArray:
+        """Speeds and yaw rates (..., 2) that controls (..., 2) lead to."""
+        if self.parameters.motion_model != "ackermann":
+            return controls
+        yaw_rates = controls[..., 0] * tan(controls[..., 1]) / self.parameters.wheelbase
+        return np.stack([controls[..., 0], yaw_rates], axis=-1)
+
+    def command(self, speed: float, turn: float) -> Command:
+        """Controls as a command."""
+        if self.parameters.motion_model == "differential":
+            return Twist.planar(vx=speed, wz=turn)
+        return AckermannCommand(speed, clamp(turn, self.steering_limit))
