@@ -57,7 +57,8 @@ class Body:
     def put_into(self, world: AnyWorld, pose: Pose) -> tuple[int, Surface]:
         """Put it into a world with its middle at a pose; return its number there and what it looks like."""
         if len(self.size) == 2:
-            number, looks = world.add_cylinder(pose, *self.size, moving=True), cylinder(*self.size)
+            radius, height = self.size
+            number, looks = world.add_cylinder(pose, radius, height, moving=True), cylinder(radius, height)
         else:
             number, looks = world.add_box(pose, self.size, moving=True), box(self.size)
         world.things[number] = self.thing
