@@ -23,8 +23,8 @@ from rich.table import Table
 
 from mbf_abstract.config.configuration import Config
 from mbf_mesh_nav.map.map_parameters import MeshMapParameters
-from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
-from mbf_mesh_nav.tiles.sources import HeightSource
+from mbf_mesh_nav.tiles.building.build import TileSettings, build_tiles
+from mbf_mesh_nav.tiles.building.sources import HeightSource
 from terrain.experiments.evaluation.entrant import configuration_of
 from terrain.experiments.evaluation.outdoor import CONFIGS, generated, has_route, outdoor
 from terrain.scenarios.environment import WORLD_STREAM

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.avoided_places import AvoidedPlace
-from mbf_mesh_nav.arrays import FloatArray, IntArray
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph
@@ -150,16 +150,12 @@ class MeshMap(SnapshotAnswers):
         KeyError
             There is no such layer.
         """
-        count = self.topology.vertex_count
         with self._lock:
-            shown = None if default_layer is None else layers[default_layer]
+            shown = self._shown(layers, default_layer)
             self.layers = layers
             self.default_layer = default_layer
             self.edge_cost_factor = edge_cost_factor
-            costs = np.zeros(count, np.float32) if shown is None else shown.costs
-            lethal = np.zeros(count, np.bool_) if shown is None else shown.lethal
-            costs.flags.writeable = lethal.flags.writeable = False  # as those of a layer: kernels know one type
-            self._snapshot = self._snapshots.begin(costs, lethal, edge_cost_factor)
+            self._snapshot = self._snapshots.begin(*shown, edge_cost_factor)
 
     def set_edge_cost_factor(self, edge_cost_factor: float) -> None:
         """Change how much costs lengthen edges, at run time.
@@ -227,12 +223,20 @@ class MeshMap(SnapshotAnswers):
         with self._lock:
             changed = self._snapshots.close(closed)
             if len(changed):
-                now = self._snapshot if self.default_layer is None else self.layers[self.default_layer]
-                self._snapshot = self._snapshots.follow(now.costs, now.lethal, changed)
+                self._snapshot = self._snapshots.follow(*self._shown(self.layers, self.default_layer), changed)
 
     def _publish(self, changed: dict[str, IntArray]) -> None:
         """Make the snapshot that follows a change of the default layer; only edges at changed vertices are touched."""
         if self.default_layer not in changed:
             return
-        layer, vertices = self.layers[self.default_layer], changed[self.default_layer]
-        self._snapshot = self._snapshots.follow(layer.costs, layer.lethal, vertices)
+        self._snapshot = self._snapshots.follow(
+            *self._shown(self.layers, self.default_layer), changed[self.default_layer]
+        )
+
+    def _shown(self, layers: LayerGraph, default_layer: str | None) -> tuple[Float32Array, BoolArray]:
+        """Costs and lethal flags (V,) of the default layer; without one every vertex is free."""
+        if default_layer is not None:
+            return layers[default_layer].costs, layers[default_layer].lethal
+        costs, lethal = np.zeros(self.topology.vertex_count, np.float32), np.zeros(self.topology.vertex_count, np.bool_)
+        costs.flags.writeable = lethal.flags.writeable = False  # as those of a layer: kernels know one type
+        return costs, lethal

@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import SnapshotSeries
 
@@ -57,3 +59,11 @@ def test_the_arrays_of_a_snapshot_nobody_holds_are_used_again(topology):
     series.follow(costs, lethal, changed)
     snapshot = series.follow(costs, lethal, changed)
     assert not np.shares_memory(snapshot.edge_weights, held)
+
+
+def test_a_place_to_avoid_is_free_again_on_a_map_without_a_default_layer():
+    mesh_map = MeshMap.from_heights(np.zeros((5, 5)), 0.5, 0.5)
+    mesh_map.avoid([AvoidedPlace(Pose((1.0, 1.0, 0.0)), 0.6)])
+    assert mesh_map.snapshot().lethal.any()
+    mesh_map.avoid([])
+    assert not mesh_map.snapshot().lethal.any()
