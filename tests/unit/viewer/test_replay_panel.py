@@ -144,7 +144,7 @@ def test_the_legend_names_what_occurs_in_the_run_and_nothing_else(hill_recording
     hill = [entry.name for entry in legend_of(hill_recording)]
     office = [entry.name for entry in legend_of(replace(office_recording, actors=people))]
 
-    assert hill == ["plan", "driven", "slope 0°", "slope 10°", "slope 20°", "slope 30°", "slope 45°"]
-    assert office == ["plan", "driven", "seen by a sensor", "on no map", "person"]
+    assert hill == ["plan", "driven track", "slope 0°", "slope 10°", "slope 20°", "slope 30°", "slope 45°"]
+    assert office == ["plan", "driven track", "seen by a sensor", "on no map", "person"]
     page = panel_html([], legend_of(hill_recording))
     assert "rgb(25,90,220)" in page and ">plan<" in page
