@@ -1,7 +1,11 @@
-"""Decides whether the robot has arrived: by the plugin's answer, by the server's tolerances, or by either."""
+"""Decides whether the robot has arrived: by the plugin's answer, by the server's tolerances, or by either.
+
+Also where it stops then: a robot that slides out of the tolerance after it has stopped is driven back in.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -10,6 +14,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.tangent_plane import SAME_STOREY, at_height_of, ground_distance, heading_error
 from mbf_abstract.goals.goal_area import GoalArea
 from mbf_abstract.maps.relaxation import NO_SLACK, Slack
+from mbf_abstract.time.clock import Clock
 
 ToleranceCheck = Literal["plugin", "either", "exclusive"]
 
@@ -17,6 +22,17 @@ STRAYING = 2.0
 """So many times its distance from the path a robot may be short of the path's end: a controller may leave the path."""
 DEPTH_SHARE = 0.9
 """Share of the end's depth in an area that a controller may stop short of it."""
+
+MAX_RETURNS = 3
+"""So many times a robot is driven back into the tolerance it has slid out of."""
+SLIDE_MARGIN = 1.5
+"""So many times as far as it slid it is driven in again: it may slide farther the next time."""
+LEAST_SHARE = 0.25
+"""Share of the tolerance that is always left to the controller on the way back in."""
+NEARER = 0.01
+"""Less [m] than this is not nearer to the goal."""
+LONGEST_APPROACH = 1.0
+"""Time [s] after which a robot within its tolerance that comes no nearer stops where it is."""
 
 
 @dataclass(frozen=True)
@@ -69,11 +85,65 @@ class ArrivalCheck:
             return self.within(pose, tracker)
         return plugin_agrees or (self.check == "either" and self.within(pose, tracker))
 
+    def distance(self, pose: Pose) -> float:
+        """Distance [m] to the end of the path in the robot's tangent plane."""
+        return ground_distance(pose, self.goal, self.same_storey)
+
+    def is_elsewhere(self, other: ArrivalCheck) -> bool:
+        """Whether another goal is meant, and not another path to the same."""
+        return self.goal.distance_to(other.goal) > self.dist_tolerance
+
     def within(self, pose: Pose, tracker: PathTracker) -> bool:
         """Whether ``pose`` is inside both tolerances, at the end of the path and not where the path passes earlier."""
-        close = ground_distance(pose, self.goal, self.same_storey) < self.dist_tolerance
+        close = self.distance(pose) < self.dist_tolerance
         lift = at_height_of(pose, self.goal, self.same_storey).distance_to(
             pose
         )  # a path may climb to a goal above the ground
         driven = tracker.has_arrived(self.dist_tolerance + STRAYING * tracker.deviation + lift)
         return close and driven and abs(heading_error(pose, self.goal)) < self.angle_tolerance
+
+
+class StopsAtGoal:
+    """Where a robot stops near the end of its path, and whether it may try again after it has slid away.
+
+    The first stop is at the tolerance. The next are farther in, by more than the robot slid, or as far in as it gets.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, for another goal."""
+        self.returns = 0
+        self._limit = math.inf
+        self._slide = 0.0
+        self._stopped_at = 0.0
+        self._nearest = math.inf
+        self._nearer_since = self._clock.now()
+
+    def tolerance(self, arrival: ArrivalCheck) -> float:
+        """Distance [m] to the end of the path at which the controller may call the goal reached."""
+        full = arrival.dist_tolerance
+        return min(full, max(self._limit, LEAST_SHARE * full))
+
+    def is_near_enough(self, arrival: ArrivalCheck, pose: Pose) -> bool:
+        """Whether the robot may stop here if this is within the tolerance; always, until it has slid out once."""
+        if self.returns == 0:
+            return True
+        distance = arrival.distance(pose)
+        if distance < self._nearest - NEARER:
+            self._nearest, self._nearer_since = distance, self._clock.now()
+        return distance <= self.tolerance(arrival) or self._clock.now() - self._nearer_since >= LONGEST_APPROACH
+
+    def begin(self, distance: float) -> None:
+        """Take note that the robot is stopped, at this distance [m] from the end of the path."""
+        self._stopped_at = distance
+
+    def drive_back(self, distance: float) -> bool:
+        """Take note that it stands outside, at this distance [m]; False where it has been driven back often enough."""
+        self._slide = max(self._slide, distance - self._stopped_at)
+        self._limit = self._stopped_at - SLIDE_MARGIN * self._slide
+        self._nearest, self._nearer_since = distance, self._clock.now()
+        self.returns += 1
+        return self.returns <= MAX_RETURNS

@@ -15,6 +15,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.drive.velocity_gate import Lease
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
+from mbf_abstract.execution.arrival import ArrivalCheck, StopsAtGoal
 from mbf_abstract.execution.controller_state import ControllerEnd, ControllerState, Plan
 from mbf_abstract.execution.motion_watch import MotionWatch
 from mbf_abstract.execution.plugin_answer import PluginFault, PluginNonFinite
@@ -66,7 +67,7 @@ class ControllerExecution:
         self.last_result: ControlResult | None = None
         self._motion = MotionWatch(run.runtime)
         self._graceful_stop: Stopwatch | None = None
-        self._drove_back = False
+        self._stops = StopsAtGoal(run.runtime.clock)
         self._lease: Lease | None = None
         self.state = ControllerState.INITIALIZED
 
@@ -134,8 +135,8 @@ class ControllerExecution:
             return self._hold(lease, ExePathOutcome.MAP_ERROR, problem)
         velocity = measured or Twist()
         if self._is_arrived(pose, velocity):
-            return self._come_to_rest(velocity, lease)
-        end = self._watch_motion(pose, measured)
+            return self._come_to_rest(pose, velocity, lease)
+        end = self._drive_back_in(pose) or self._watch_motion(pose, measured)
         if end is not None:
             return end
         result = self._compute(pose, measured)
@@ -157,9 +158,10 @@ class ControllerExecution:
         if not self._run.call("set_plan", partial(self._controller.set_plan, plan.path)):
             text = f"controller {self._run.plugin.name!r} refused the path"
             return self._end(ControllerState.INVALID_PLAN, ExePathOutcome.INVALID_PATH, text)
+        if self._plan is None or plan.arrival.is_elsewhere(self._plan.arrival):
+            self._stops.reset()
         self._plan = plan
         self._graceful_stop = None
-        self._drove_back = False
         if self.state is ControllerState.STOPPING:
             self._enter(ControllerState.STARTED)
         return None
@@ -207,29 +209,32 @@ class ControllerExecution:
         return self._end(ControllerState.PAT_EXCEEDED, outcome, reason) if self._run.is_patience_over() else None
 
     def _is_arrived(self, pose: Pose, velocity: Twist) -> bool:
-        """Ask while the robot drives, and once more when it stands.
-
-        One that coasted out of the tolerance while it stopped is driven back in, once: it could coast out for ever.
-        """
+        """Ask while the robot drives, and once more when it stands: it may have slid out of the tolerance."""
+        is_stopping = self.state is ControllerState.STOPPING
+        if is_stopping and not self._stands(velocity):
+            return True
         assert self._plan is not None
-        if self.state is ControllerState.STOPPING:
-            if self._drove_back or not self._stands(velocity):
-                return True
-            self._drove_back = True
-        slack = self._runtime.relaxation.slack(self._runtime.clock.now())
-        arrival, is_goal_reached = self._plan.arrival.relaxed(slack), self._controller.is_goal_reached
         self._plan.tracker.update(pose.position)
-        plugin_agrees = self._run.call(
-            "is_goal_reached",
-            lambda: bool(is_goal_reached(pose, arrival.dist_tolerance, arrival.angle_tolerance)),
-        )
+        slack = self._runtime.relaxation.slack(self._runtime.clock.now())
+        arrival = self._plan.arrival.relaxed(slack)
+        if is_stopping or self._stops.is_near_enough(arrival, pose):
+            return self._is_reached(pose, arrival, arrival.dist_tolerance)
+        self._is_reached(pose, arrival, self._stops.tolerance(arrival))  # says how far in to drive
+        return False
+
+    def _is_reached(self, pose: Pose, arrival: ArrivalCheck, dist_tolerance: float) -> bool:
+        assert self._plan is not None
+        ask = partial(self._controller.is_goal_reached, pose, dist_tolerance, arrival.angle_tolerance)
+        plugin_agrees = self._run.call("is_goal_reached", lambda: bool(ask()))
         return arrival.reached(pose, self._plan.tracker, plugin_agrees)
 
-    def _come_to_rest(self, velocity: Twist, lease: Lease) -> ControllerEnd | None:
+    def _come_to_rest(self, pose: Pose, velocity: Twist, lease: Lease) -> ControllerEnd | None:
         """At the goal: with ``force_stop_at_goal`` the goal succeeds once the robot stands, else at once."""
+        assert self._plan is not None
         if not self._runtime.parameters.force_stop_at_goal or self._stands(velocity):
             return self._end(ControllerState.ARRIVED_GOAL, ExePathOutcome.SUCCESS, "goal reached")
         if self.state is not ControllerState.STOPPING:
+            self._stops.begin(self._plan.arrival.distance(pose))
             self._run.patience_watch.restart()
             self._enter(ControllerState.STOPPING)
         self._write_to_robot(lease.stop)
@@ -237,6 +242,17 @@ class ControllerExecution:
             text = f"the robot is at its goal but still moves at {velocity.speed:.2f} m/s, {velocity.wz:.2f} rad/s"
             return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, text)
         return None
+
+    def _drive_back_in(self, pose: Pose) -> ControllerEnd | None:
+        """Let a robot that stands outside of its goal's tolerance drive again; the end where that did not help."""
+        assert self._plan is not None
+        if self.state is not ControllerState.STOPPING:
+            return None
+        distance = self._plan.arrival.distance(pose)
+        if self._stops.drive_back(distance):
+            return None
+        text = f"{distance:.2f} m from its goal: the robot slid away each of the {self._stops.returns} times it stopped"
+        return self._end(ControllerState.MISSED_GOAL, ExePathOutcome.MISSED_GOAL, text)
 
     def _stands(self, velocity: Twist) -> bool:
         limit = self._runtime.parameters.goal_max_speed

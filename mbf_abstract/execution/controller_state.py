@@ -22,6 +22,7 @@ class ControllerState(Enum):
     PAUSED = "paused"
     STOPPING = "stopping"
     ARRIVED_GOAL = "arrived_goal"
+    MISSED_GOAL = "missed_goal"
     NO_PLAN = "no_plan"
     EMPTY_PLAN = "empty_plan"
     INVALID_PLAN = "invalid_plan"

@@ -62,19 +62,40 @@ def _sliding_back(session, distances):
     return odometry
 
 
-@pytest.mark.parametrize(
-    ("slides", "times_stopped", "ends_inside"), [([], 1, True), ([0.1], 2, True), ([0.1] * 9, 2, False)]
-)
-def test_a_robot_that_slides_out_of_the_tolerance_while_it_stops_is_driven_back_in_once(
-    make_session, states, slides, times_stopped, ends_inside
+@pytest.mark.parametrize(("slides", "times_stopped"), [([], 1), ([0.1], 2), ([0.1] * 9, 2), ([0.02, 0.1, 0.12], 3)])
+@pytest.mark.parametrize("who", ["mbf_tolerance_exclusive", "mbf_tolerance_check", ""])
+def test_a_robot_that_slides_out_of_the_tolerance_while_it_stops_is_driven_in_farther(
+    make_session, states, slides, times_stopped, who
 ):
-    session = make_session(force_stop_at_goal=True, mbf_tolerance_exclusive=True)
+    session = make_session(force_stop_at_goal=True, **({who: True} if who else {}))
     session.robot.odometry = _sliding_back(session, slides)
     session.controller.play(drive(0.2))
     result = session.navigator.exe_path(session.path_to(1.0), dist_tolerance=0.3)
     assert result.success
     assert states(session, "controller_execution").count("stopping") == times_stopped
-    assert (abs(session.robot.pose.x - 1.0) < 0.3) is ends_inside
+    assert abs(session.robot.pose.x - 1.0) < 0.3
+
+
+def test_a_robot_that_slides_away_from_its_goal_each_time_has_missed_it(make_session, states):
+    session = make_session(force_stop_at_goal=True, mbf_tolerance_exclusive=True)
+    session.robot.odometry = _sliding_back(session, [0.4] * 9)
+    session.controller.play(drive(0.2))
+    result = session.navigator.exe_path(session.path_to(1.0), dist_tolerance=0.3)
+    assert result.outcome == Outcome.MISSED_GOAL
+    assert "m from its goal: the robot slid away each of the 4 times it stopped" in result.message
+    assert states(session, "controller_execution")[-1] == "missed_goal"
+    assert session.robot.command.is_stopped()
+
+
+def test_a_robot_that_gets_no_farther_in_stops_where_it_is(make_session, states):
+    """It slid by 0.1 m and can come back to 0.27 m at most: within its tolerance, but not by as much as it slid."""
+    session = make_session(force_stop_at_goal=True, mbf_tolerance_exclusive=True)
+    session.robot.odometry = _sliding_back(session, [0.1])
+    session.controller.play(*[drive(0.2)] * 83, drive(0.001))
+    result = session.navigator.exe_path(session.path_to(1.0), dist_tolerance=0.3)
+    assert result.success
+    assert states(session, "controller_execution") == ["started", "controlling", "stopping", "controlling", "arrived_goal"]
+    assert 0.2 < abs(session.robot.pose.x - 1.0) < 0.3
 
 
 def test_a_robot_that_does_not_come_to_rest_at_its_goal_is_no_success(make_session):
