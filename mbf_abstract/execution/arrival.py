@@ -6,6 +6,7 @@ Also where it stops then: a robot that slides out of the tolerance after it has 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -122,28 +123,36 @@ class StopsAtGoal:
         self._nearest = math.inf
         self._nearer_since = self._clock.now()
 
-    def tolerance(self, arrival: ArrivalCheck) -> float:
-        """Distance [m] to the end of the path at which the controller may call the goal reached."""
-        full = arrival.dist_tolerance
-        return min(full, max(self._limit, LEAST_SHARE * full))
+    def is_arrived(self, arrival: ArrivalCheck, pose: Pose, stands: bool, ask: Callable[[float], bool]) -> bool:
+        """Whether a robot that drives may stop here, or one that stands has arrived.
 
-    def is_near_enough(self, arrival: ArrivalCheck, pose: Pose) -> bool:
-        """Whether the robot may stop here if this is within the tolerance; always, until it has slid out once."""
-        if self.returns == 0:
-            return True
-        distance = arrival.distance(pose)
+        Parameters
+        ----------
+        ask : callable
+            Answers for a distance tolerance [m] whether the goal is reached; that is how far in a controller drives.
+        """
+        full = arrival.dist_tolerance
+        if stands or self.returns == 0:
+            return ask(full)
+        distance, wanted = arrival.distance(pose), min(full, max(self._limit, LEAST_SHARE * full))
         if distance < self._nearest - NEARER:
             self._nearest, self._nearer_since = distance, self._clock.now()
-        return distance <= self.tolerance(arrival) or self._clock.now() - self._nearer_since >= LONGEST_APPROACH
+        if distance <= wanted or self._clock.now() - self._nearer_since >= LONGEST_APPROACH:
+            return ask(full)
+        ask(wanted)
+        return False
 
-    def begin(self, distance: float) -> None:
-        """Take note that the robot is stopped, at this distance [m] from the end of the path."""
-        self._stopped_at = distance
+    def begin(self, arrival: ArrivalCheck, pose: Pose) -> None:
+        """Take note that the robot is stopped here."""
+        self._stopped_at = arrival.distance(pose)
 
-    def drive_back(self, distance: float) -> bool:
-        """Take note that it stands outside, at this distance [m]; False where it has been driven back often enough."""
+    def drive_back(self, arrival: ArrivalCheck, pose: Pose) -> str:
+        """Take note that the robot stands outside; why it is not to be driven back in, or an empty text."""
+        distance = arrival.distance(pose)
         self._slide = max(self._slide, distance - self._stopped_at)
         self._limit = self._stopped_at - SLIDE_MARGIN * self._slide
         self._nearest, self._nearer_since = distance, self._clock.now()
         self.returns += 1
-        return self.returns <= MAX_RETURNS
+        if self.returns <= MAX_RETURNS:
+            return ""
+        return f"{distance:.2f} m from its goal: the robot slid away each of the {self.returns} times it stopped"

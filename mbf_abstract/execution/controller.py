@@ -217,10 +217,7 @@ class ControllerExecution:
         self._plan.tracker.update(pose.position)
         slack = self._runtime.relaxation.slack(self._runtime.clock.now())
         arrival = self._plan.arrival.relaxed(slack)
-        if is_stopping or self._stops.is_near_enough(arrival, pose):
-            return self._is_reached(pose, arrival, arrival.dist_tolerance)
-        self._is_reached(pose, arrival, self._stops.tolerance(arrival))  # says how far in to drive
-        return False
+        return self._stops.is_arrived(arrival, pose, is_stopping, partial(self._is_reached, pose, arrival))
 
     def _is_reached(self, pose: Pose, arrival: ArrivalCheck, dist_tolerance: float) -> bool:
         assert self._plan is not None
@@ -234,7 +231,7 @@ class ControllerExecution:
         if not self._runtime.parameters.force_stop_at_goal or self._stands(velocity):
             return self._end(ControllerState.ARRIVED_GOAL, ExePathOutcome.SUCCESS, "goal reached")
         if self.state is not ControllerState.STOPPING:
-            self._stops.begin(self._plan.arrival.distance(pose))
+            self._stops.begin(self._plan.arrival, pose)
             self._run.patience_watch.restart()
             self._enter(ControllerState.STOPPING)
         self._write_to_robot(lease.stop)
@@ -246,13 +243,8 @@ class ControllerExecution:
     def _drive_back_in(self, pose: Pose) -> ControllerEnd | None:
         """Let a robot that stands outside of its goal's tolerance drive again; the end where that did not help."""
         assert self._plan is not None
-        if self.state is not ControllerState.STOPPING:
-            return None
-        distance = self._plan.arrival.distance(pose)
-        if self._stops.drive_back(distance):
-            return None
-        text = f"{distance:.2f} m from its goal: the robot slid away each of the {self._stops.returns} times it stopped"
-        return self._end(ControllerState.MISSED_GOAL, ExePathOutcome.MISSED_GOAL, text)
+        problem = self._stops.drive_back(self._plan.arrival, pose) if self.state is ControllerState.STOPPING else ""
+        return self._end(ControllerState.MISSED_GOAL, ExePathOutcome.MISSED_GOAL, problem) if problem else None
 
     def _stands(self, velocity: Twist) -> bool:
         limit = self._runtime.parameters.goal_max_speed
@@ -268,7 +260,7 @@ class ControllerExecution:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, str(error))
         if result.success and result.command is None:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, "success, but no command")
-        if result.success:
+        elif result.success:
             result = self._avoid_contact(pose, self._runtime.velocity_or_command(measured), result)
         self.last_result = result
         self._cycles += 1
@@ -337,12 +329,9 @@ class ControllerExecution:
         return ControllerEnd(state, int(outcome), message)
 
     def _stops_at(self, state: ControllerState) -> bool:
-        parameters = self._runtime.parameters
         if state is ControllerState.ARRIVED_GOAL:
-            return parameters.force_stop_at_goal
-        if state is ControllerState.CANCELED:
-            return parameters.force_stop_on_cancel
-        return True
+            return self._runtime.parameters.force_stop_at_goal
+        return state is not ControllerState.CANCELED or self._runtime.parameters.force_stop_on_cancel
 
     def _report_cycles(self, began: float) -> None:
         """Record how often the plugin was asked; an event for each call would drown all others."""
