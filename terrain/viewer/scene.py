@@ -133,16 +133,19 @@ def route_of(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
     return ends, points.min(axis=0), points.max(axis=0)
 
 
-def look_at_route(camera: Any, recording: Recording, farther: float = 1.0) -> None:
-    """Put the first camera where start, goals and track are all in the picture, seen slantwise from the side."""
+def look_at_route(camera: Any, recording: Recording, farther: float = 1.0, upright: bool = False) -> None:
+    """Put the camera where start, goals and track are all in the picture.
+
+    It looks slantwise from the side; into an ``upright`` picture, such as a phone's, from behind the start.
+    """
     ends, lower, upper = route_of(recording)
     middle, length = (lower + upper) / 2.0, farther * max(float(np.linalg.norm(upper - lower)), 6.0)
-    along = ends[-1, :2] - ends[0, :2]
-    side = np.array([along[1], -along[0]]) / max(float(np.linalg.norm(along)), 1e-9)
-    if not side.any():
-        side = np.array([0.0, -1.0])
+    along = (ends[-1, :2] - ends[0, :2]) / max(float(np.linalg.norm(ends[-1, :2] - ends[0, :2])), 1e-9)
+    setback = -along if upright else np.array([along[1], -along[0]])
+    if not setback.any():
+        setback = np.array([0.0, -1.0])
     camera.fov = CAMERA_FIELD_OF_VIEW
-    camera.position = (*(middle[:2] + CAMERA_SETBACK * length * side), middle[2] + CAMERA_HEIGHT * length)
+    camera.position = (*(middle[:2] + CAMERA_SETBACK * length * setback), middle[2] + CAMERA_HEIGHT * length)
     camera.look_at = tuple(middle)
 
 

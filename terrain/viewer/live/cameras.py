@@ -19,6 +19,8 @@ from terrain.worlds.surface import Surface
 FIRST_DISTANCE = 9.0  # m from the robot when the camera begins to follow
 LOWEST = 0.5  # least height of the first view over its distance
 NEAR = 0.01  # m; viser's own near plane
+UPRIGHT = 0.75  # width by height; in a narrower picture the route leads upward
+UPRIGHT_FARTHER = 1.25  # than in a replay; panels lie below such a picture
 CUTAWAY = 1.5  # m before the robot from where on things are drawn that would hide it
 MARGIN = 1.1  # of what must be seen
 STEEPEST = np.cos(np.radians(15.0))  # of a camera that looks down, so that a near plane is as good as level
@@ -52,6 +54,7 @@ class Cameras:
         self._floors = storeys(ground)
         self._views: dict[int, str] = {}
         self._followed: dict[int, FloatArray] = {}  # where the robot was, by visitor
+        self._met: set[int] = set()
         look_at_route(server_page.initial_camera, start, farther)
 
     def choose(self, visitor: int, view: str, robot: FloatArray) -> None:
@@ -63,7 +66,7 @@ class Cameras:
         self._views[visitor] = view
         client.camera.near = NEAR
         if view == "overview":
-            look_at_route(client.camera, self._start, self._farther)
+            self._overlook(client.camera)
         elif view == "storey":
             middle, half = 0.5 * (self._lower + self._upper), 0.5 * MARGIN * (self._upper - self._lower)
             floor = self.floor_below(robot)
@@ -75,15 +78,25 @@ class Cameras:
         """Forget a visitor."""
         self._views.pop(visitor, None)
         self._followed.pop(visitor, None)
+        self._met.discard(visitor)
 
     def show(self, robot: FloatArray) -> None:
         """Move the cameras that move with the robot, which is at ``robot`` (3,) [m]."""
         for visitor, client in self._server.get_clients().items():
+            if visitor not in self._met:
+                self._met.add(visitor)
+                if client.camera.aspect < UPRIGHT:  # the page's first view is the same for all, that of a wide picture
+                    self._overlook(client.camera)
             view = self._views.get(visitor, "free")
             if view == "follow":
                 self._follow(visitor, client.camera, robot)
             elif view == "storey":
                 client.camera.near = self._above_ceiling(client.camera, robot)
+
+    def _overlook(self, camera: Camera) -> None:
+        """Show all of the route."""
+        upright = camera.aspect < UPRIGHT
+        look_at_route(camera, self._start, UPRIGHT_FARTHER if upright else self._farther, upright)
 
     def floor_below(self, robot: FloatArray) -> float:
         """Height [m] of the storey that the robot is on; of the ground below it in a world of one level."""

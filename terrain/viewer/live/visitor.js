@@ -91,8 +91,28 @@
   const fit = () => {
     canvas = [...document.querySelectorAll("canvas")].reduce((a, b) => (a && area(a) >= area(b) ? a : b), null);
     const box = canvas ? canvas.getBoundingClientRect() : { left: 0, top: 0, width: 0, height: 0 };
+    const bottom = Math.min(box.top + box.height, fitSheet());
     Object.assign(root.style, { left: `${box.left}px`, top: `${box.top}px`, width: `${box.width}px`,
-      height: `${box.height}px` });
+      height: `${bottom - box.top}px` });
+  };
+  // On a phone viser's panel is a sheet at the bottom, open over more than half of the scene. It begins folded, and what
+  // is shown here stays above it. Returns its upper edge, in pixels.
+  const fitSheet = () => {
+    const sheet = [...document.querySelectorAll('[style*="max-height"]')].find(({ style }) =>
+      style.position === "fixed" && style.bottom === "0px");
+    const handle = sheet?.querySelector('[style*="cursor: pointer"]');
+    if (!handle) return Infinity;
+    if (!sheet.dataset.mbfSheet) {
+      sheet.dataset.mbfSheet = "folded";
+      Object.assign(sheet.style, { width: "100%", maxHeight: "50%" });
+      handle.parentElement.style.width = "100vw";
+      const sign = element(handle, "span", "margin-left:auto;font:13px system-ui,sans-serif;color:#1f6feb;");
+      new ResizeObserver(() => {
+        sign.textContent = sheet.offsetHeight > 2 * handle.offsetHeight ? "Hide controls" : "Controls";
+      }).observe(sheet);
+      handle.click();
+    }
+    return sheet.getBoundingClientRect().top;
   };
   const isOnScene = ({ target }) => // viser lays a second canvas over that of the scene
     canvas !== null && ((target.tagName === "CANVAS" && area(target) === area(canvas)) || target.contains?.(canvas));
@@ -172,7 +192,8 @@
     knob.style.transform = `translate(${-turn * PAD * 0.7}px, ${-forward * PAD * 0.7}px)`;
     knob.style.background = stick ? "#1f6feb" : "#8a8f98";
   };
-  const showStatus = (text) => { if (status) status.textContent = stick ? text || "taking over" : "Hold to drive, or space + WASD"; };
+  const showStatus = (text) => { if (status) status.textContent = stick ? text || "taking over" : howToHold; };
+  const howToHold = matchMedia("(pointer: coarse)").matches ? "Hold to drive" : "Hold to drive, or space + WASD";
   const letGo = () => { held.clear(); if (stick) hold(null); };
   const addStick = () => {
     const card = element(root, "div", "position:absolute;right:10px;bottom:10px;padding:6px;width:130px;" +

@@ -37,6 +37,10 @@ COSTMAP = {  # the same on cells
 VALUES = "document.getElementById('mbf-values').innerText"
 STICK = "document.getElementById('mbf-stick').parentElement.innerText"
 CANVAS = "document.querySelector('canvas')"
+STICK_AND_SHEET = (  # the gap between both [pixels]
+    "document.querySelector('[data-mbf-sheet]').getBoundingClientRect().top"
+    " - document.querySelector('#mbf-stick').getBoundingClientRect().bottom"
+)
 PLACE = f"(() => {{ const r = {CANVAS}.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
 
 DISABLED = """(() => {
@@ -116,6 +120,38 @@ def test_a_page_for_watching_only_shows_the_run_without_a_button_that_could_be_p
     assert errors == [] and "lidar" in disabled
     steering = ("Cancel", "Pause", "End the run", "Inject", "a click is", "Waypoints", "WASD", "Place")
     assert not [word for word in steering if word in text]
+
+
+def test_on_a_phone_the_scene_is_free_and_the_controls_open_below_it(chromium, served_run, tmp_path):
+    address = served_run[1]
+    edges = """['#mbf-stick', '[data-mbf-sheet]'].map(name => {
+      const box = document.querySelector(name).getBoundingClientRect(); return [box.top, box.bottom, box.width]; })"""
+    sheet = "document.querySelector('[data-mbf-sheet]')"
+
+    async def look(page):
+        await page.resize(390, 844)
+        await page.open(address)
+        await page.wait_for(f"{sheet} !== null && {sheet}.offsetHeight < 100")
+        await page.wait_for("document.querySelector('#mbf-stick') !== null")
+        await page.wait_for(f"{STICK_AND_SHEET} > 0")
+        folded = await page.evaluate(edges)
+        (tmp_path / "phone.png").write_bytes(await page.screenshot())
+        await page.click(300, 820)
+        await page.wait_for(f"{sheet}.offsetHeight > 300 && {STICK_AND_SHEET} > 0")
+        await page.read("Hide controls")
+        opened = await page.evaluate(edges)
+        await page.resize(844, 390)  # held sideways it is as a desktop, and folded again when upright
+        await page.wait_for(f"{sheet} === null")
+        await page.resize(390, 844)
+        await page.wait_for(f"{sheet} !== null && {sheet}.offsetHeight < 100")
+        return page.errors, folded, opened
+
+    errors, folded, opened = chromium.visit(look)
+
+    assert errors == []
+    assert folded[1][0] > 0.9 * 844 and folded[1][2] == 390, "the sheet is a bar along the lower edge"
+    assert folded[0][1] < folded[1][0], "nothing covers the stick"
+    assert opened[1][0] >= 0.5 * 844 - 1 and opened[0][1] < opened[1][0]
 
 
 @pytest.mark.parametrize("served_run", [COSTMAP], ids=["costmap"], indirect=True)

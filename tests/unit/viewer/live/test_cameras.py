@@ -7,7 +7,8 @@ import pytest
 
 from mbf_abstract.maps.view import GridView, MeshView
 from terrain.sensors.rays import StaticRays
-from terrain.viewer.live.cameras import CUTAWAY, FIRST_DISTANCE, NEAR, Cameras, first_direction, ray_through
+from terrain.viewer.live.cameras import CUTAWAY, FIRST_DISTANCE, NEAR, UPRIGHT, Cameras, first_direction, ray_through
+from terrain.viewer.live.page import FARTHER
 from terrain.viewer.live.readout import Readout
 from terrain.worlds.multi_level import parking_garage
 
@@ -64,7 +65,7 @@ class Watched:
         self.camera = camera(position=np.array([14.0, -10.0, 30.0]), look_at=np.array([14.0, 7.0, 0.0]))
         clients = {3: SimpleNamespace(camera=self.camera)}
         server = SimpleNamespace(get_clients=lambda: clients, initial_camera=camera())
-        self.cameras = Cameras(server, recording, ground, StaticRays(*ground))
+        self.cameras = Cameras(server, recording, ground, StaticRays(*ground), FARTHER)
         self.low, self.high = (np.array([14.0, 7.0, z]) for z in self.cameras._floors)
 
 
@@ -107,6 +108,29 @@ def test_a_camera_that_is_free_or_gone_is_left_alone(watched):
     watched.cameras.leave(3)
     watched.cameras.show(watched.low)
     assert watched.camera.position is before
+
+
+@pytest.mark.parametrize("aspect", [0.46, 0.6, 0.9, 1.6])
+def test_start_and_goal_are_in_the_first_view_of_an_upright_and_of_a_wide_picture(garage_recording, aspect):
+    seen = Watched(garage_recording)
+    first, seen.camera.aspect = seen.camera.position, aspect
+    seen.cameras.show(seen.low)
+    assert (seen.camera.position is first) == (aspect > UPRIGHT), "a wide one has the view of the page"
+    seen.cameras.choose(3, "overview", seen.low)
+    for pose in (garage_recording.start, *garage_recording.goals):
+        across, upward = np.abs(place_in_picture(seen.camera, np.array(pose.position)))
+        assert across < 0.9 and upward < 0.9
+
+
+def place_in_picture(seen_from, point):
+    """Where a point is, from -1 to 1 across and upward."""
+    ahead = np.array(seen_from.look_at) - seen_from.position
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    offset, half = point - seen_from.position, np.tan(0.5 * seen_from.fov)
+    across, upward, depth = (float(offset @ axis) for axis in (right, np.cross(right, ahead), ahead))
+    return np.array([across / (depth * half * seen_from.aspect), upward / (depth * half)])
 
 
 class TwoViews:
