@@ -11,6 +11,7 @@ import numpy as np
 
 from mbf_abstract.whole_files import write_whole
 from terrain.sweeps.statistics import METRICS, Row, values_of
+from terrain.sweeps.variants import short_names
 
 TRACK = "track"
 LEAST_HEIGHT, MOST_HEIGHT = 0.15, 1.0  # of the tracks' plan, in its widths
@@ -38,6 +39,7 @@ def write_figures(rows: Sequence[Row], folder: Path) -> list[Path]:
 def _draw_boxes(figure: Any, variants: Mapping[str, Sequence[Row]]) -> bool:
     """A panel for each metric that has values, a box for each variant: quartiles, median, every run as a dot."""
     shown = [metric for metric in METRICS if any(values_of(rows, metric) for rows in variants.values())]
+    names = [_shown(name) for name in short_names(list(variants)).values()]
     if not shown:
         return False
     columns = min(3, len(shown))
@@ -49,10 +51,11 @@ def _draw_boxes(figure: Any, variants: Mapping[str, Sequence[Row]]) -> bool:
     for number, (panel, metric) in enumerate(zip(panels, shown, strict=False)):
         values = [values_of(rows, metric) for rows in variants.values()]
         places = range(len(values), 0, -1)
+        panel.use_sticky_edges = False  # else a box of no width lies on the panel's edge
         for place, of_variant, colour in zip(places, values, _colours(len(values)), strict=True):
             if of_variant:
                 _draw_box(panel, place, of_variant, colour)
-        panel.set_yticks(list(places), [_shown(name) if number % columns == 0 else "" for name in variants], fontsize=7)
+        panel.set_yticks(list(places), names if number % columns == 0 else [""] * len(names), fontsize=7)
         panel.set_xlabel(metric.title)
         panel.spines[["top", "right"]].set_visible(False)
     return True
@@ -79,8 +82,9 @@ def _draw_tracks(figure: Any, variants: Mapping[str, Sequence[Row]]) -> bool:
     width, height = np.ptp(points, axis=0).tolist()
     figure.set_size_inches(6.4, 1.2 + 5.4 * min(max(height / max(width, 1e-9), LEAST_HEIGHT), MOST_HEIGHT))
     panel = figure.subplots()
-    for (name, rows), colour in zip(variants.items(), _colours(len(variants)), strict=True):
-        label: str | None = _shown(name)
+    names = short_names(list(variants))
+    for (variant, rows), colour in zip(variants.items(), _colours(len(variants)), strict=True):
+        label: str | None = _shown(names[variant])
         for row in rows:
             if not row.get(TRACK):
                 continue
@@ -99,7 +103,7 @@ def _colours(count: int) -> list[str]:
 
 
 def _shown(variant: str) -> str:
-    return (variant or "as written").replace("$", r"\$")
+    return variant.replace("$", r"\$")
 
 
 def _bytes_of(figure: Any, suffix: str) -> bytes:

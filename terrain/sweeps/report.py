@@ -11,17 +11,18 @@ import csv
 import html
 import importlib
 import importlib.util
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import median
 from typing import Any
-from urllib.parse import quote
 
 from mbf_abstract.whole_files import replacing, write_whole
 from terrain.recording.verdict import Level
 from terrain.sweeps.figures import write_figures
+from terrain.sweeps.html_tables import html_page, html_table
 from terrain.sweeps.latex import latex_table
 from terrain.sweeps.statistics import METRICS, Row, compare_variants, rate_of, spread_of, values_of
+from terrain.sweeps.variants import AS_WRITTEN, common_settings, short_names
 
 COLUMNS = (
     "variant",
@@ -56,18 +57,13 @@ COLUMNS = (
     "verdict",
     "folder",
 )
+IN_THE_VERDICT = ("success", "outcome", "outcome_code")
 TEST_COLUMNS = ("first", "second", "metric", "pairs", "difference", "p", "p_holm")
-STYLE = (
-    "body{font:14px sans-serif;margin:2em}table{border-collapse:collapse;margin-bottom:2em}"
-    "th,td{border:1px solid #bbb;padding:.2em .6em;text-align:right}td.text{text-align:left}"
-    ".wide{overflow-x:auto}td{white-space:nowrap}svg{max-width:100%;height:auto}"
-    "tr.success{background:#e6f4e9}tr.arrived{background:#fdf3d3}tr.failed{background:#fbe3e0}"
-)
 
 
 TESTS = (
     "Difference: second minus first, in the median, for success in the share. Success: McNemar's exact test; numbers: "
-    "Wilcoxon's signed-rank test by changes of signs. p_holm is corrected for the number of all these tests (Holm)."
+    "Wilcoxon's signed-rank test by changes of signs. p (Holm) is corrected for the number of all these tests (Holm)."
 )
 
 
@@ -109,7 +105,7 @@ def spread_table(rows: Sequence[Row]) -> list[dict[str, Any]]:
 def _spread_line(variant: str, metric: str, runs: int, *numbers: Any) -> dict[str, Any]:
     names = ("median", "lower_quartile", "upper_quartile", "low_95", "high_95")
     return {
-        "variant": variant or "as written",
+        "variant": variant or AS_WRITTEN,
         "metric": metric,
         "runs": runs,
         **dict(zip(names, numbers, strict=True)),
@@ -120,8 +116,8 @@ def comparison_table(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Return a line per test of two variants, see ``terrain.sweeps.statistics``."""
     return [
         {
-            "first": test.first or "as written",
-            "second": test.second or "as written",
+            "first": test.first or AS_WRITTEN,
+            "second": test.second or AS_WRITTEN,
             "metric": test.metric,
             "pairs": test.pairs,
             "difference": round(test.difference, 6),
@@ -149,7 +145,7 @@ def summarise(rows: Sequence[Row]) -> list[dict[str, Any]]:
         ratios = [row["path_over_geodesic"] for row in arrived if row.get("path_over_geodesic")]
         lines.append(
             {
-                "variant": variant or "as written",
+                "variant": variant or AS_WRITTEN,
                 "runs": len(runs),
                 "success_percent": round(100.0 * len(arrived) / len(runs), 1),
                 "arrived_with_failures": sum(row["level"] == Level.ARRIVED.value for row in runs),
@@ -189,44 +185,36 @@ def _write_parquet(table: Sequence[Row], file: Path) -> Path:
 def _page(
     title: str, table: Sequence[Row], spreads: Sequence[Row], tests: Sequence[Row], figures: Sequence[Path]
 ) -> str:
-    parts = [html_table(summarise(table)) if table else ""]
+    names = short_names(sorted({row["variant"] for row in table}))
+    shared = ", ".join(common_settings(list(names)))
+    parts = [f"<p>All variants have {html.escape(shared)}.</p>" if shared else ""]
+    parts += [html_table(_named(summarise(table), names)) if table else ""]
     parts += [_inline(figure.read_text("utf-8")) for figure in figures]
     if spreads:
-        parts += ["<h2>Medians, quartiles and 95 % intervals</h2>", html_table(spreads)]
+        parts += ["<h2>Medians, quartiles and 95 % intervals</h2>", html_table(_named(spreads, names))]
     if tests:
-        parts += ["<h2>Tests of two variants, seed by seed</h2>", f"<p>{TESTS}</p>", html_table(tests)]
-    first = ("variant", "seed", "folder")  # a link at the end of a wide table is not found
-    parts += ["<h2>All runs</h2>", html_table([{**{name: row[name] for name in first}, **row} for row in table])]
+        parts += ["<h2>Tests of two variants, seed by seed</h2>", f"<p>{TESTS}</p>", html_table(_named(tests, names))]
+    parts += ["<h2>All runs</h2>", html_table(_named([_reordered(row) for row in table], names))]
     return html_page(title, parts)
 
 
-def html_page(title: str, parts: Iterable[str]) -> str:
-    """Return a page with a heading and parts that are HTML; it needs no other file."""
-    return (
-        '<!doctype html><html lang="en"><meta charset="utf-8">'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{html.escape(title)}</title>'
-        f"<style>{STYLE}</style><h1>{html.escape(title)}</h1>{''.join(parts)}</html>\n"
-    )
+def _named(lines: Sequence[Row], names: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Lines with the short names of variants."""
+    return [
+        {
+            key: names.get(value, value) if key in ("variant", "first", "second") else value
+            for key, value in line.items()
+        }
+        for line in lines
+    ]
+
+
+def _reordered(row: Row) -> dict[str, Any]:
+    """A row as a reader wants it: link and verdict first, without what the verdict and the colour say already."""
+    first = ("variant", "seed", "folder", "verdict")  # at the end of a wide table they are not found
+    return {**{name: row[name] for name in first}, **{name: row[name] for name in row if name not in IN_THE_VERDICT}}
 
 
 def _inline(svg: str) -> str:
     """A figure as a part of a page."""
     return f"<div>{svg[svg.index('<svg') :]}</div>"
-
-
-def html_table(rows: Sequence[Row]) -> str:
-    """Return rows as a table; the ``level`` of a row is its colour, see ``STYLE``."""
-    if not rows:
-        return "<p>No runs yet.</p>"
-    head = "".join(f"<th>{html.escape(name)}</th>" for name in rows[0])
-    lines = ((row.get("level", ""), "".join(map(_html_cell, row, row.values()))) for row in rows)
-    body = "".join(f'<tr class="{level}">{cells}</tr>' for level, cells in lines)
-    return f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'
-
-
-def _html_cell(name: str, value: object) -> str:
-    if name == "folder" and value:
-        address = html.escape(quote(f"{value}/replay.html"))
-        return f'<td class="text"><a href="{address}">replay</a></td>'
-    text = f"{value:.4g}" if isinstance(value, float) else str(value)
-    return f'<td class="{"text" if isinstance(value, str) else ""}">{html.escape(text)}</td>'

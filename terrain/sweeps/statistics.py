@@ -116,6 +116,24 @@ def quartiles_of(values: Sequence[float]) -> tuple[float, float, float]:
     return lower, median, upper
 
 
+def decimals_for(columns: Sequence[Sequence[float]]) -> int:
+    """Return the decimals with which the largest median of these values has three digits; all of a column have these.
+
+    >>> decimals_for([[63.7], [102.4]]), decimals_for([[0.145]]), decimals_for([[]])
+    (0, 3, 2)
+    """
+    largest = max((abs(quartiles_of(values)[1]) for values in columns if len(values)), default=0.0)
+    return max(0, 2 - math.floor(math.log10(largest))) if largest > 0.0 else 2
+
+
+def pairs_needed(tests: int, p: float) -> int:
+    """Return the fewest pairs with which one of so many tests can have a corrected p below ``p``.
+
+    The least p of a test by changes of n signs is 2^(1 - n).
+    """
+    return next(pairs for pairs in itertools.count(1) if tests * 2.0 ** (1 - pairs) < p)
+
+
 def _drawn_medians(array: FloatArray) -> FloatArray:
     """Medians (DRAWS,) of the values drawn again, in blocks, because all at once can take gigabytes."""
     rng, rows = np.random.default_rng(len(array)), max(1, BLOCK // len(array))

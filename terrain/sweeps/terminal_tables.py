@@ -8,7 +8,16 @@ from rich.box import SIMPLE
 from rich.markup import escape
 from rich.table import Table
 
-from terrain.sweeps.statistics import METRICS, Row, compare_variants, quartiles_of, rate_of, values_of
+from terrain.sweeps.statistics import (
+    METRICS,
+    Row,
+    compare_variants,
+    decimals_for,
+    pairs_needed,
+    quartiles_of,
+    rate_of,
+    values_of,
+)
 
 SHOWN = ("spl", "time_s", "path_length_m", "clearance_min_m", "planning_wall_median_ms")
 SIGNIFICANT = 0.05
@@ -31,10 +40,13 @@ def summary_table(rows: Sequence[Row]) -> Table:
     table = _table("medians; quartiles and intervals are in sweep.html")
     for title in ("success", *(metric.title for metric in metrics)):
         table.add_column(escape(title.replace(" [", "\n[")), justify="right")
-    for variant, letter in letters_of(rows).items():
-        of = [row for row in rows if row["variant"] == variant]
-        columns = (values_of(of, metric) for metric in metrics)
-        medians = (f"{quartiles_of(values)[1]:.3g}" if values else "-" for values in columns)
+    letters = letters_of(rows)
+    of_variant = {variant: [row for row in rows if row["variant"] == variant] for variant in letters}
+    decimals = [decimals_for([values_of(of, metric) for of in of_variant.values()]) for metric in metrics]
+    for variant, letter in letters.items():
+        of = of_variant[variant]
+        columns = zip((values_of(of, metric) for metric in metrics), decimals, strict=True)
+        medians = (f"{quartiles_of(values)[1]:.{digits}f}" if values else "-" for values, digits in columns)
         rate = rate_of(of)
         table.add_row(letter, f"{rate.successes} of {rate.count}", *medians)
     return table
@@ -48,7 +60,8 @@ def comparison_table(rows: Sequence[Row]) -> Table | str | None:
     clear = [test for test in tests if test.corrected < SIGNIFICANT]
     title = f"corrected p below {SIGNIFICANT:g}: {len(clear)} of {len(tests)} tests, see tests.csv"
     if not clear:
-        return title
+        few = max(test.pairs for test in tests) < (needed := pairs_needed(len(tests), SIGNIFICANT))
+        return f"{title}; with fewer than {needed} seeds there can be none" if few else title
     table = _table(title)
     table.add_column("metric")
     for name in ("pairs", "difference", "p (Holm)"):

@@ -18,7 +18,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from mbf_abstract.event_values import well_formed
-from terrain.sweeps.report import html_page, html_table
+from terrain.sweeps.html_tables import html_page, html_table
 from terrain.sweeps.statistics import rate_of
 
 Row = dict[str, Any]

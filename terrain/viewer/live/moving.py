@@ -30,6 +30,7 @@ from terrain.viewer.scene import (
     wheel_angles,
 )
 
+ABOVE_PINS = 1.6  # height of the robot's label by that of markers, so that it is not on that of the start
 AHEAD = 2.0  # s over which the present command is extrapolated
 AHEAD_STEPS = 20
 FIELD_ARROWS = 40  # along the longer side of the field
@@ -55,7 +56,7 @@ class MovingThings:
         self._session = session
         self._pin_height = pin_height
         self._shape = session.recorder.robot
-        self._robot = RobotModel(self._scene, self._shape, pin_height)
+        self._robot = RobotModel(self._scene, self._shape, ABOVE_PINS * pin_height)
         self._actors = ActorModels(self._scene, session.recorder.actor_tracks())
         self._angles = np.zeros(len(self._shape.wheels))
         self._time = 0.0

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from terrain.recording.metric_names import in_words
 from terrain.recording.recording import Recording
 from terrain.viewer.reports import report
-from terrain.viewer.reports.page import beside, cell, page, table
+from terrain.viewer.reports.page import beside, cell, number, page, table
 from terrain.viewer.reports.timeline import timeline_svg
 
 WIDTH = 850  # pixels of a run's column
@@ -47,7 +48,7 @@ def compare_metrics(metrics: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...
     rows: list[tuple[str, ...]] = []
     for name in dict.fromkeys(name for run in metrics for name in run):
         difference = [_difference(*(run.get(name) for run in metrics))] if len(metrics) == 2 else []
-        rows.append((name, *(_shown(run, name) for run in metrics), *difference))
+        rows.append((in_words(name), *(_shown(run, name) for run in metrics), *difference))
     return rows
 
 
@@ -70,5 +71,5 @@ def _shown(metrics: Mapping[str, Any], name: str) -> str:
 
 def _difference(left: Any, right: Any) -> str:
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in (left, right)):
-        return f"{right - left:+.4g}" if right != left else "0"
+        return number(right - left, "+") if right != left else "0"
     return "" if left == right else "differs"

@@ -9,10 +9,12 @@ from collections.abc import Iterable
 from html import escape
 from typing import Any
 
+from terrain.recording.metric_names import in_words
 from terrain.viewer.pictures.colours import LEVELS
 
 WEBP_QUALITY = 90  # of 100; a picture of rough ground has a seventh of its PNG's bytes, and no reader sees a difference
 MAX_ROWS = 200
+WHOLE_FROM = 1000.0  # numbers that are written without decimals
 FOLDED_FROM = 60  # rows; the metrics of a run are fewer
 
 STYLE = """
@@ -71,9 +73,21 @@ def table(header: tuple[str, ...], rows: Iterable[tuple[Any, ...]]) -> str:
 def cell(value: Any) -> str:
     """A value as short text, those in lists and by names too."""
     if isinstance(value, float) and math.isfinite(value):
-        return f"{value:.4g}"
+        return number(value)
+    if value is None or isinstance(value, bool):
+        return {None: "-", True: "yes", False: "no"}[value]
     if isinstance(value, dict):
-        return ", ".join(f"{name} {cell(of)}" for name, of in value.items()) or "none"
-    if isinstance(value, list):
+        return ", ".join(_named(name, of) for name, of in value.items()) or "none"
+    if isinstance(value, list | tuple):
         return ("; " if any(isinstance(of, dict) for of in value) else ", ").join(map(cell, value)) or "none"
     return str(value)
+
+
+def number(value: float, sign: str = "") -> str:
+    """A number with four digits, never in powers of ten where it is large; ``sign`` is "+" for a difference."""
+    return f"{value:{sign}.4g}" if abs(value) < WHOLE_FROM else f"{value:{sign}.0f}"
+
+
+def _named(name: str, value: Any) -> str:
+    words, _, unit = in_words(name).removesuffix("]").partition(" [")
+    return f"{words} {cell(value)} {unit}".rstrip()

@@ -16,6 +16,7 @@ import numpy as np
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.outcomes import is_success, outcome_name
+from terrain.recording.metric_names import in_words
 from terrain.recording.metrics import cross_track_errors
 from terrain.recording.recording import Recording
 from terrain.viewer.pictures.layer_picture import has_layers, layer_picture_png
@@ -50,7 +51,7 @@ def report_html(recording: Recording, metrics: Mapping[str, Any], drawn: bytes |
         layers(recording),
         "<h2>Over time</h2>" + plots_svg(recording) if len(recording.times) else "",
         f"<h2>Actions and plugins</h2><p>{TIMELINE_TEXT}</p>{timeline_svg(recording.events)}",
-        "<h2>Metrics</h2>" + table(("name", "value"), metrics.items()),
+        "<h2>Metrics</h2>" + table(("metric", "value"), ((in_words(name), value) for name, value in metrics.items())),
         "<h2>Results of the goals, in order</h2>" + goals_table(recording),
         "<h2>Incidents, faults, stops and recoveries</h2>" + notable_table(recording),
     ]

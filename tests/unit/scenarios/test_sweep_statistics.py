@@ -13,6 +13,7 @@ from rich.console import Console
 
 from terrain.scenarios.scenario import load_scenario
 from terrain.sweeps.figures import write_figures
+from terrain.sweeps.html_tables import decimals_of, html_table
 from terrain.sweeps.latex import escaped, latex_table
 from terrain.sweeps.report import write_tables
 from terrain.sweeps.statistics import (
@@ -21,6 +22,8 @@ from terrain.sweeps.statistics import (
     Comparison,
     compare_variants,
     corrected,
+    decimals_for,
+    pairs_needed,
     rate_of,
     signed_rank_p,
     spread_of,
@@ -28,6 +31,7 @@ from terrain.sweeps.statistics import (
 )
 from terrain.sweeps.sweep import SweepRun, run_once
 from terrain.sweeps.terminal_tables import comparison_table, summary_table
+from terrain.sweeps.variants import common_settings, short_names
 
 NUMBERS = st.lists(st.integers(-6, 6), min_size=1, max_size=7)
 
@@ -105,6 +109,42 @@ def test_the_interval_of_a_rate_is_where_the_rate_is_1_96_standard_errors_away(s
     for end in (rate.low, rate.high):
         if 0.0 < end < 1.0:
             assert abs(rate.share - end) == pytest.approx(1.96 * (end * (1 - end) / n) ** 0.5, rel=1e-3)
+
+
+@pytest.mark.parametrize(("medians", "decimals"), [((63.7, 102.4), 0), ((0.145, 0.02), 3), ((), 2), ((0.0,), 2)])
+def test_a_column_of_a_table_has_decimals_for_three_digits_of_its_largest_median(medians, decimals):
+    assert decimals_for([[median] for median in medians]) == decimals
+
+
+@pytest.mark.parametrize("tests", [1, 7, 21, 100])
+def test_the_pairs_that_are_needed_are_the_fewest_that_all_point_to_one_side_with_such_a_p(tests):
+    pairs = pairs_needed(tests, 0.05)
+    assert tests * p_of_all_signs([1.0] * pairs) < 0.05 <= tests * p_of_all_signs([1.0] * (pairs - 1))
+
+
+def test_a_sweep_with_few_seeds_reports_how_many_a_clear_difference_needs():
+    rows = [row(seed, variant, spl=0.5 + 0.1 * (variant == "b")) for seed in range(4) for variant in "ab"]
+    assert "with fewer than 8 seeds there can be none" in comparison_table(rows)
+    many = [row(seed, variant) for seed in range(8) for variant in "ab"]
+    assert "fewer" not in comparison_table(many)
+
+
+def test_what_all_variants_share_is_not_in_their_names():
+    first, second = "a.b={x: 1, y: z=2} backend=mesh planner=cvp", "a.b={x: 1, y: z=2} backend=mesh planner=astar"
+    assert short_names([first, second]) == {first: "planner=cvp", second: "planner=astar"}
+    assert common_settings([first, second])[-1] == "backend=mesh"
+    assert short_names(["planner=cvp"]) == {"planner=cvp": "planner=cvp"} and common_settings(["planner=cvp"]) == []
+    assert short_names([""]) == {"": "as written"}
+    table = latex_table([row(0, first), row(0, second)])
+    assert "planner=cvp & 100" in table and "% All variants have a.b=" in table and table.count("backend=mesh") == 1
+
+
+def test_the_numbers_of_a_column_of_a_page_have_the_same_decimals_and_empty_columns_are_left_out():
+    lines = [{"entry": "a", "time_s": 33.95, "why": ""}, {"entry": "b", "time_s": 34.0, "why": ""}]
+    table = html_table(lines)
+    assert "<td>33.95</td>" in table and "<td>34.00</td>" in table
+    assert '<th class="">time [s]</th>' in table and "why" not in table
+    assert [decimals_of(values) for values in ([2.825, 161.0], [20557.5, ""], [1.0, 0.996], ["-"])] == [1, 0, 3, 0]
 
 
 def test_success_is_compared_by_the_seeds_in_which_one_of_two_succeeded():

@@ -26,7 +26,15 @@ def test_the_page_has_both_runs_in_two_columns_and_needs_nothing_else(hill_recor
 
 
 def test_differences_are_right_minus_left_and_only_of_numbers():
-    left = {"time_s": 10.0, "success": True, "incidents": [], "plans": 3, "energy_j": 5.0, "limit": None}
+    left = {
+        "time_s": 10.0,
+        "success": True,
+        "incidents": [],
+        "plans": 3,
+        "energy_j": 5.0,
+        "limit": None,
+        "work_j": 20000.0,
+    }
     right = {
         "time_s": 12.5,
         "success": False,
@@ -34,16 +42,18 @@ def test_differences_are_right_minus_left_and_only_of_numbers():
         "plans": 3,
         "wall_time_s": 1.0,
         "limit": None,
+        "work_j": 21234.5,
     }
 
     assert compare_metrics([left, right]) == [
-        ("time_s", "10", "12.5", "+2.5"),
-        ("success", "True", "False", "differs"),
+        ("time [s]", "10", "12.5", "+2.5"),
+        ("success", "yes", "no", "differs"),
         ("incidents", "none", "collision", "differs"),
         ("plans", "3", "3", "0"),
-        ("energy_j", "5", "-", "differs"),
+        ("energy [J]", "5", "-", "differs"),
         ("limit", "-", "-", ""),
-        ("wall_time_s", "-", "1", "differs"),
+        ("work [J]", "20000", "21234", "+1234"),
+        ("wall time [s]", "-", "1", "differs"),
     ]
 
 
@@ -57,8 +67,8 @@ def test_the_command_prints_a_table_and_writes_the_page(hill_recording, office_r
 
     assert result.exit_code == 0, result.output
     lines = [re.split(r"\s*│\s*", line.strip("│ ")) for line in result.stdout.splitlines()]
-    assert ["slipped_m", "-", "0.25", "differs"] in lines
-    assert any(line[0] == "control_cycles" and line[1:] == ["500", "500", "0"] for line in lines)
+    assert ["slipped [m]", "-", "0.25", "differs"] in lines
+    assert any(line[0] == "control cycles" and line[1:] == ["500", "500", "0"] for line in lines)
     assert "hill on mesh" in (tmp_path / "page.html").read_text()
 
 
@@ -103,7 +113,7 @@ def test_any_number_of_runs_is_compared_in_80_columns(hill_recording, office_rec
     same = "a_run_with_quite_a_long_name_0, a_run_with_quite_a_long_name_2"
     assert f"only these are the same drive: {same}" in result.stdout
     values = [re.split(r"\s*│\s*", line.strip("│ ")) for line in tables]
-    assert ["path_length_m", "20", "21", "22"] in values and ["path_length_m", "23"] in values
+    assert ["driven length [m]", "20", "21", "22"] in values and ["driven length [m]", "23"] in values
     assert (tmp_path / "page.html").read_text().count("<img") == 4
 
 

@@ -29,7 +29,7 @@ def report_of(recording):
 def test_the_report_reports_outcome_metrics_and_stops(office_recording):
     page = report_of(office_recording)
 
-    for words in ("BLOCKED_PATH: a box stands on the path", "max_tilt_deg", "no command for 0.5 s", "turtlebot"):
+    for words in ("BLOCKED_PATH: a box stands on the path", "max tilt [°]", "no command for 0.5 s", "turtlebot"):
         assert words in page
 
 
@@ -109,9 +109,12 @@ def test_the_pictures_of_a_report_are_smaller_than_the_picture_alone(hill_record
         (0.123456, "0.1235"),
         ([0.15, 17.188733853], "0.15, 17.19"),
         ([{"angle_deg": 3.9055440, "distance_m": 0.128872}, {"angle_deg": 1.0}],
-         "angle_deg 3.906, distance_m 0.1289; angle_deg 1"),
+         "angle 3.906 °, distance 0.1289 m; angle 1 °"),
         ([], "none"),
-        (True, "True"),
+        (True, "yes"),
+        (None, "-"),
+        (20557.015, "20557"),
+        ((0.5, True), "0.5, yes"),
     ],
 )  # fmt: skip
 def test_a_value_in_a_table_is_short_also_within_lists_and_names(value, text):
