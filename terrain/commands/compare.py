@@ -30,6 +30,8 @@ def compare(
         from terrain.recording.run_folder import read_run
         from terrain.viewer.reports.comparison import compare_digests, compare_metrics, comparison_html, metrics_header
 
+        for folder in folders:
+            refuse_folder_of_runs(folder)
         runs, names = [read_run(folder) for folder in folders], names_of(folders)
         for name, (recording, _) in zip(names, runs, strict=True):
             print_verdict(recording.verdict, f"{name}: ")
@@ -48,7 +50,30 @@ def compare(
     typer.echo(out.resolve())
 
 
+def refuse_folder_of_runs(folder: Path) -> None:
+    """Raise RecordingError for a folder that is no run and holds some, such as that of a variant or of a sweep."""
+    from terrain.recording.recording import RecordingError
+    from terrain.recording.run_folder import is_run
+
+    if is_run(folder) or not folder.is_dir():
+        return
+    seeds = sorted(inner for inner in folder.glob("**/seed_*") if is_run(inner))
+    if runs := seeds or [inner for inner in sorted(folder.iterdir()) if is_run(inner)]:
+        raise RecordingError(
+            f"{folder}: expected the folder of a run, got one that holds {len(runs)}; "
+            f"name single ones, such as {runs[0]}"
+            + (". All seeds of a sweep are compared in its sweep.html and tests.csv" if seeds else "")
+        )
+
+
 def names_of(folders: Sequence[Path]) -> list[str]:
-    """Return the names of the folders; where two have the same, their whole paths."""
+    """Return the folders' names, or where two have the same, their paths without what all begin and end with."""
     names = [folder.name for folder in folders]
-    return names if len(set(names)) == len(names) else [str(folder) for folder in folders]
+    if len(set(names)) == len(names):
+        return names
+    paths = [list(folder.resolve().parts) for folder in folders]
+    while len({path[0] for path in paths}) == 1 and min(map(len, paths)) > 1:
+        paths = [path[1:] for path in paths]
+    while len({path[-1] for path in paths}) == 1 and min(map(len, paths)) > 1:
+        paths = [path[:-1] for path in paths]
+    return ["/".join(path) for path in paths]

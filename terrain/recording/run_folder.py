@@ -173,18 +173,19 @@ def read_run(folder: Path) -> tuple[Recording, dict[str, Any]]:
     return recording, metrics
 
 
+def is_run(folder: Path) -> bool:
+    """Whether a folder has the recording of a robot, whole or of a run that was cut short."""
+    return (folder / "recording.npz").is_file() or has_parts(folder)
+
+
 def robots_of(folder: Path) -> list[str]:
     """Return the names of the robots that have a recording in a run's folder, sorted; "" for a run with one robot.
 
     A folder without any recording counts as that of one robot.
     """
-
-    def is_recorded(of_one: Path) -> bool:
-        return (of_one / "recording.npz").is_file() or has_parts(of_one)
-
-    if is_recorded(folder) or not folder.is_dir():
+    if is_run(folder) or not folder.is_dir():
         return [""]
-    return sorted(part.name for part in folder.iterdir() if part.is_dir() and is_recorded(part)) or [""]
+    return sorted(part.name for part in folder.iterdir() if part.is_dir() and is_run(part)) or [""]
 
 
 def clear_results(folder: Path) -> None:

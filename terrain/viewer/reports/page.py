@@ -23,10 +23,13 @@ h1 { font-size: 1.5em; margin-bottom: 0; } h2 { font-size: 1.15em; margin-top: 2
 .outcome { font-size: 1.15em; font-weight: 600; }
 table { border-collapse: collapse; } td, th { text-align: left; padding: 2px 14px 2px 0; vertical-align: top; }
 th { color: #555; font-weight: 600; border-bottom: 1px solid #ccc; } td:first-child { white-space: nowrap; }
-td { overflow-wrap: anywhere; }
+td, th { overflow-wrap: anywhere; } .wide { overflow-x: auto; }
 img { max-width: 100%; height: auto; } svg { width: 100%; height: auto; } summary { color: #555; cursor: pointer; }
 .beside { display: grid; grid-auto-flow: column; grid-auto-columns: 1fr; gap: 0 2em; align-items: start; }
 .beside > * { min-width: 0; }
+@media (max-width: 600px) {
+  .beside { grid-auto-flow: row; grid-auto-columns: auto; } td:first-child { white-space: normal; }
+}
 """
 STYLE += "".join(f".{level.value} {{ color: {colour}; }}\n" for level, colour in LEVELS.items())
 
@@ -66,7 +69,7 @@ def table(header: tuple[str, ...], rows: Iterable[tuple[Any, ...]]) -> str:
         "<tr>" + "".join(f"<td>{escape(cell(value))}</td>" for value in row) + "</tr>" for row in listed[:MAX_ROWS]
     )
     more = f"<p>and {len(listed) - MAX_ROWS} more, see events.jsonl</p>" if len(listed) > MAX_ROWS else ""
-    text = f"<table><tr>{head}</tr>{body}</table>{more}"
+    text = f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>{more}'
     return text if len(listed) <= FOLDED_FROM else f"<details><summary>{len(listed)} rows</summary>{text}</details>"
 
 

@@ -2,10 +2,13 @@
 
 import json
 import re
+from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
+from terrain.commands.compare import names_of
 from terrain.recording.metrics import measure
 from terrain.viewer.reports.comparison import compare_metrics, comparison_html
 
@@ -121,3 +124,32 @@ def test_one_run_alone_is_refused(tmp_path):
     result = compare(tmp_path)
 
     assert result.exit_code == 2 and "two or more folders" in result.output
+
+
+def test_a_folder_of_seeds_is_refused_with_the_name_of_a_run_in_it(hill_recording, tmp_path):
+    for variant in ("planner=cvp", "planner=astar"):
+        for seed in range(3):
+            (folder := tmp_path / variant / f"seed_{seed}").mkdir(parents=True)
+            hill_recording.save(folder / "recording.npz")
+
+    result = compare(tmp_path / "planner=cvp", tmp_path / "planner=astar")
+    of_one_seed = compare(*tmp_path.glob("*/seed_1"), "--out", tmp_path / "page.html")
+
+    assert result.exit_code == 2
+    for words in ("holds 3", str(tmp_path / "planner=cvp" / "seed_0"), "sweep.html"):
+        assert words in " ".join(result.output.split())
+    assert of_one_seed.exit_code == 0 and "planner=cvp: SUCCESS" in of_one_seed.stdout
+
+
+@pytest.mark.parametrize(
+    ("folders", "names"),
+    [
+        (("a/first", "b/second"), ["first", "second"]),
+        (("runs/a/seed_0", "runs/b/seed_0"), ["a", "b"]),
+        (("runs/a/seed_0", "runs/a/seed_1", "runs/b/seed_0"), ["a/seed_0", "a/seed_1", "b/seed_0"]),
+        (("x/run", "y/x/run"), ["x", "y/x"]),
+    ],
+)
+def test_runs_are_named_by_what_distinguishes_their_folders(folders, names, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert names_of([Path(folder) for folder in folders]) == names
