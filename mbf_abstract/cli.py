@@ -10,7 +10,11 @@ Exit codes: 0 success, 1 the run was no success or no path was found, 2 bad argu
 from __future__ import annotations
 
 import gc
+import os
+import sys
+from collections.abc import Callable
 from importlib.metadata import EntryPoint, version
+from typing import Any
 
 import typer
 
@@ -69,4 +73,32 @@ def _add_commands(app: typer.Typer, point: EntryPoint) -> None:
 def main() -> None:
     """Run the command line."""
     gc.set_threshold(YOUNG_OBJECTS, *gc.get_threshold()[1:])
-    make_app()()
+    app = make_app()
+    if not any(name.startswith("_") and name.endswith("_COMPLETE") for name in os.environ):  # a shell asks for words
+        keep_parameters_of(app, sys.argv[1] if len(sys.argv) > 1 else "")
+    app()
+
+
+def keep_parameters_of(app: typer.Typer, wanted: str) -> None:
+    """Take the parameters from all commands of ``app`` but the one called ``wanted``.
+
+    typer works them out for every command from its signature, with their types, which takes a third of ``mbf --help``,
+    and help needs the names and the first sentences only. Groups keep those of all of their commands if ``wanted`` is
+    their name.
+    """
+    for command in app.registered_commands:
+        if command.name != wanted and command.callback is not None:
+            command.callback, command.cls = _without_parameters(command.callback), None
+    for group in app.registered_groups:
+        if group.name != wanted and group.typer_instance is not None:
+            keep_parameters_of(group.typer_instance, "")
+
+
+def _without_parameters(callback: Callable[..., Any]) -> Callable[[], None]:
+    """A function with the name and the text of another one."""
+
+    def described() -> None:
+        raise AssertionError("a command that was not called")
+
+    described.__name__, described.__doc__ = callback.__name__, callback.__doc__
+    return described

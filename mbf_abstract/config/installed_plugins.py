@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import Distribution, EntryPoint, entry_points
 
 DISTRIBUTION = "mbf-flex"
 GROUPS = ("planners", "controllers", "recoveries", "refiners", "costmap_layers", "mesh_layers", "servers")
@@ -78,9 +78,19 @@ def entry_of(group: str, points: list[EntryPoint], error: str | None = None) -> 
 
 def origin_of(point: EntryPoint) -> str:
     """Return distribution and version of an entry point."""
-    return f"{point.dist.name} {point.dist.version}" if point.dist is not None else "unknown distribution"
+    return "unknown distribution" if point.dist is None else " ".join(_name_and_version(point.dist))
 
 
 def is_ours(points: list[EntryPoint]) -> bool:
     """Whether this package alone offers what has these entry points of one name."""
-    return all(point.dist is not None and point.dist.name == DISTRIBUTION for point in points) and len(points) == 1
+    return (
+        all(point.dist is not None and _name_and_version(point.dist)[0] == DISTRIBUTION for point in points)
+        and len(points) == 1
+    )
+
+
+@lru_cache(maxsize=256)
+def _name_and_version(distribution: Distribution) -> tuple[str, str]:
+    """Read the metadata of a distribution once: it parses its whole file, readme included, for each of both."""
+    metadata = distribution.metadata
+    return metadata["Name"], metadata["Version"]

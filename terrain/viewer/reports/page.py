@@ -28,7 +28,8 @@ img { max-width: 100%; height: auto; } svg { width: 100%; height: auto; } summar
 .beside { display: grid; grid-auto-flow: column; grid-auto-columns: 1fr; gap: 0 2em; align-items: start; }
 .beside > * { min-width: 0; }
 @media (max-width: 600px) {
-  .beside { grid-auto-flow: row; grid-auto-columns: auto; } td:first-child { white-space: normal; }
+  .beside { grid-auto-flow: row; grid-auto-columns: auto; }
+  td:first-child { white-space: normal; } td, th { min-width: 5em; }
 }
 """
 STYLE += "".join(f".{level.value} {{ color: {colour}; }}\n" for level, colour in LEVELS.items())

@@ -7,7 +7,7 @@ import os
 import pytest
 
 from mbf_abstract.config import installed_plugins
-from mbf_abstract.config.installed_plugins import installed_points, points_of
+from mbf_abstract.config.installed_plugins import DISTRIBUTION, entry_of, installed_points, is_ours, points_of
 
 GROUP = "mbf.planners"
 
@@ -50,3 +50,20 @@ def test_what_has_not_changed_is_read_once(monkeypatch):
 
     assert [bool(installed_points(group)) for group in (GROUP, "mbf.servers", "mbf.nothing")] == [True, True, False]
     assert len(reads) == 1
+
+
+def test_the_metadata_of_a_package_are_read_once_for_all_of_its_plugins(monkeypatch):
+    reads, metadata = [], importlib.metadata.Distribution.metadata.fget
+
+    def counted(distribution):
+        reads.append(distribution)
+        return metadata(distribution)
+
+    monkeypatch.setattr(importlib.metadata.Distribution, "metadata", property(counted))
+    installed_plugins._all_points.cache_clear()
+    installed_plugins._name_and_version.cache_clear()
+    plugins = [points for points in points_of("planners").values() if is_ours(points)]
+
+    assert len(plugins) > 5
+    assert {entry_of("planners", points).origin.split()[0] for points in plugins} == {DISTRIBUTION}
+    assert len(reads) == len(set(map(id, reads))), "no distribution is read twice"
