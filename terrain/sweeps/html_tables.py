@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from urllib.parse import quote
 
-from terrain.recording.metric_names import in_words
 from terrain.sweeps.statistics import Row
+from terrain.viewer.reports.metric_names import in_words
 
 STYLE = (
     "body{font:14px system-ui,sans-serif;color:#222;margin:2em}h1{font-size:1.6em}h2{font-size:1.25em}"

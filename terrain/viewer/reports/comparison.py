@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from terrain.recording.metric_names import in_words
 from terrain.recording.recording import Recording
 from terrain.viewer.reports import report
+from terrain.viewer.reports.metric_names import in_words
 from terrain.viewer.reports.page import beside, cell, number, page, table
 from terrain.viewer.reports.timeline import timeline_svg
 

@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from html import escape
 from typing import Any
 
-from terrain.recording.metric_names import in_words
 from terrain.viewer.pictures.colours import LEVELS
+from terrain.viewer.reports.metric_names import in_words
 
 WEBP_QUALITY = 90  # of 100; a picture of rough ground has a seventh of its PNG's bytes, and no reader sees a difference
 MAX_ROWS = 200

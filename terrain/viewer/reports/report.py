@@ -16,13 +16,13 @@ import numpy as np
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.outcomes import is_success, outcome_name
-from terrain.recording.metric_names import in_words
 from terrain.recording.metrics import cross_track_errors
 from terrain.recording.recording import Recording
 from terrain.viewer.pictures.layer_picture import has_layers, layer_picture_png
 from terrain.viewer.pictures.picture import ViewerMissing
 from terrain.viewer.pictures.run_picture import picture_png
 from terrain.viewer.reports.event_lines import NOTABLE, event_text
+from terrain.viewer.reports.metric_names import in_words
 from terrain.viewer.reports.page import image, page, table
 from terrain.viewer.reports.timeline import timeline_svg
 

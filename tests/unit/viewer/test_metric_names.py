@@ -4,9 +4,9 @@ from dataclasses import fields
 
 import pytest
 
-from terrain.recording.metric_names import WORDS, in_words
 from terrain.recording.metrics import Metrics
 from terrain.sweeps.report import COLUMNS
+from terrain.viewer.reports.metric_names import WORDS, in_words
 
 
 @pytest.mark.parametrize(
