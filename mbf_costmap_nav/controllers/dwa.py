@@ -16,15 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Twist
+from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
+from mbf_abstract.maps.controllers.standing import StandingParameters
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_abstract.plugins import ControlRequest, ControlResult
-from mbf_costmap_nav.control.path_handling import ControlCycle, PathFollower
+from mbf_abstract.plugins import ControlResult
+from mbf_costmap_nav.control.path_handling import ControlCycle
+from mbf_costmap_nav.control.sampling_follower import SamplingFollower
 from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score
 from mbf_costmap_nav.critics import CriticParameters
 from mbf_costmap_nav.critics.obstacle_critic import COLLISION
-from mbf_costmap_nav.kernels.control.rollout import clip_velocities
+from mbf_costmap_nav.kernels.control.rollout import clip_velocities, integrate
+from mbf_costmap_nav.plugins import CostmapContext
 
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
@@ -51,13 +55,39 @@ class DWAParameters(PluginParameters):
         CriticParameters(path_align=6.0, path_follow=8.0, obstacle=3.0), "Weights of the trajectory critics."
     )
     moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
+    standing: StandingParameters = parameter(StandingParameters(), "What it does where its motions get it nowhere.")
 
 
-class DWAController(PathFollower):
+class DWAController(SamplingFollower):
     """Samples the dynamic window and scores the arcs."""
 
     Parameters: ClassVar[type[PluginParameters]] = DWAParameters
     parameters: DWAParameters
+
+    def __init__(self, context: CostmapContext) -> None:
+        super().__init__(context)
+        self.parameters_changed()
+
+    def parameters_changed(self) -> None:
+        """Take over new limits."""
+        p = self.parameters
+        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0)
+
+    @property
+    def standing(self) -> StandingParameters:
+        """As configured."""
+        return self.parameters.standing
+
+    def limits(self, cycle: ControlCycle) -> MotionLimits:
+        """Those of the window."""
+        p, top = self.parameters, cycle.speed_limit
+        gains = p.acc_lim_x * p.window_time, p.acc_lim_theta * p.window_time
+        return MotionLimits(max(p.min_vel_x, -top), min(p.max_vel_x, top), p.max_vel_theta, False, *gains)
+
+    def moving_around(self, cycle: ControlCycle) -> MovingAround:
+        """What the map tracks now."""
+        objects = self.parameters.moving_objects
+        return MovingAround.on(self.navigation_map, cycle.request.pose, self.clock.now(), objects)
 
     @property
     def turns_on_the_spot(self) -> bool:
@@ -69,18 +99,14 @@ class DWAController(PathFollower):
         """Largest speed in any direction [m/s]."""
         return max(self.parameters.max_vel_x, self.parameters.max_vel_y)
 
-    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+    def sampled(self, cycle: ControlCycle, around: MovingAround) -> ControlResult:
         """Sample, roll out, score, and take the cheapest arc that the full footprint can drive."""
-        cycle = self.begin_cycle(request)
-        if isinstance(cycle, ControlResult):
-            return cycle
         p = self.parameters
         candidates = self._window(cycle)
         steps = max(2, round(p.sim_time / p.sim_step))
         velocities = self._ramps(cycle, candidates, steps)
         rollouts = roll_out(cycle, velocities, p.sim_step, p.max_vel_x * p.sim_time)
         costs = score(p.critics, rollouts)
-        around = MovingAround.on(self.navigation_map, cycle.request.pose, self.clock.now(), p.moving_objects)
         met = around.meet(rollouts.poses, p.sim_step)
         hindered_by = around.hindering(met, costs)
         costs += met.costs
@@ -88,11 +114,24 @@ class DWAController(PathFollower):
         for sample in np.argsort(costs, kind="stable").tolist():
             if costs[sample] >= COLLISION:
                 break
-            if is_free(cycle, rollouts.poses[:, :checked_steps, sample]):
+            ramp = rollouts.poses[:, :checked_steps, sample]
+            if is_free(cycle, ramp) and is_free(cycle, self._held(cycle, candidates[sample], checked_steps)):
                 command = Twist.planar(*candidates[sample].tolist())
                 return ControlResult(ExePathOutcome.SUCCESS, "", command, hindered_by)
-        text = f"all {len(candidates)} reachable velocities lead into an obstacle within {p.sim_time:g} s"
-        return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
+        pose = cycle.request.pose
+        text = f"all {len(candidates)} velocities reachable at ({pose.x:.2f}, {pose.y:.2f}) lead into an obstacle"
+        return ControlResult(ExePathOutcome.NO_VALID_CMD, f"{text} within {p.sim_time:g} s")
+
+    def _held(self, cycle: ControlCycle, candidate: FloatArray, steps: int) -> Float32Array:
+        """Poses (3, steps) of a robot that takes up a velocity (3,) at once.
+
+        A quick robot does; the ramp is what a slow one drives. Only a first step that was looked at leads to where the
+        arc of this cycle can be driven on in the next.
+        """
+        velocities = np.repeat(candidate.astype(np.float32)[:, None, None], steps, axis=1)
+        poses = np.empty_like(velocities)
+        integrate(velocities, cycle.request.pose.yaw, self.parameters.sim_step, poses)
+        return np.asarray(poses[:, :, 0])
 
     def _ramps(self, cycle: ControlCycle, candidates: FloatArray, steps: int) -> Float32Array:
         """Velocities (3, steps, n): from the measured one to each candidate at the accelerations allowed, then held."""

@@ -24,11 +24,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Twist
+from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
+from mbf_abstract.maps.controllers.standing import StandingParameters
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
-from mbf_costmap_nav.control.path_handling import ControlCycle, PathFollower
+from mbf_abstract.plugins import ControlResult, PlannedMotion
+from mbf_costmap_nav.control.path_handling import ControlCycle
+from mbf_costmap_nav.control.sampling_follower import SamplingFollower
+from mbf_costmap_nav.control.sampling_noise import correlated_noise, smoothing_matrix
 from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score
 from mbf_costmap_nav.critics import CriticParameters
 from mbf_costmap_nav.critics.obstacle_critic import COLLISION
@@ -39,8 +43,6 @@ Float32Array = NDArray[np.float32]
 
 NOISE_POOL = 4
 """Sets of noise drawn at start; each cycle uses one of them."""
-SMOOTHING = np.array([-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0]) / 231.0
-"""Savitzky-Golay filter of 9 points, quadratic (Savitzky and Golay 1964, table I)."""
 DEFAULT_RADIUS = 0.5
 """Turning radius [m] of a car where neither the parameters nor the robot give one."""
 STANDSTILL, IDLE_CYCLES = 0.05, 60
@@ -86,9 +88,10 @@ class MPPIParameters(PluginParameters):
     footprint_check_time: float = parameter(1.0, "How far the full footprint is checked.", unit="s", ge=0.0, le=10.0)
     critics: CriticParameters = parameter(CriticParameters(), "Weights of the trajectory critics.")
     moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
+    standing: StandingParameters = parameter(StandingParameters(), "What it does where its motions get it nowhere.")
 
 
-class MPPIController(PathFollower):
+class MPPIController(SamplingFollower):
     """Model predictive path integral control."""
 
     Parameters: ClassVar[type[PluginParameters]] = MPPIParameters
@@ -116,6 +119,23 @@ class MPPIController(PathFollower):
         deviation = [p.vx_std, p.vy_std if p.motion_model == "omni" else 0.0, p.wz_std]
         self._deviation = np.array(deviation, dtype=np.float32)
         self._radius = self.turning_radius
+        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0)
+
+    @property
+    def standing(self) -> StandingParameters:
+        """As configured."""
+        return self.parameters.standing
+
+    def limits(self, cycle: ControlCycle) -> MotionLimits:
+        """Those of the samples."""
+        p, top = self.parameters, cycle.speed_limit
+        gains = p.acc_lim_x * p.model_dt, p.acc_lim_theta * p.model_dt
+        return MotionLimits(max(p.min_vel_x, -top), min(p.max_vel_x, top), p.max_vel_theta, self._radius > 0.0, *gains)
+
+    def moving_around(self, cycle: ControlCycle) -> MovingAround:
+        """What the map tracks now."""
+        objects = self.parameters.moving_objects
+        return MovingAround.on(self.navigation_map, cycle.request.pose, self.clock.now(), objects)
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path; the nominal sequence is kept while driving, so that a new plan does not jerk."""
@@ -143,17 +163,15 @@ class MPPIController(PathFollower):
         p = self.parameters
         return max(p.max_vel_x, p.max_vel_y) if p.motion_model == "omni" else p.max_vel_x
 
-    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+    def sampled(self, cycle: ControlCycle, around: MovingAround) -> ControlResult:
         """One cycle: sample around the nominal sequence, score, average, check, shift."""
-        cycle = self.begin_cycle(request)
-        if isinstance(cycle, ControlResult):
-            return cycle
-        controls = self._optimise(cycle)
+        controls = self._optimise(cycle, around)
         if controls is None:  # start over from standing still: the old sequence may be what collides
             self._nominal[:] = 0.0
-            controls = self._optimise(cycle)
+            controls = self._optimise(cycle, around)
         if controls is None:
-            text = f"none of {self.parameters.batch_size} sampled trajectories is free of collision"
+            place = f"({cycle.request.pose.x:.2f}, {cycle.request.pose.y:.2f})"
+            text = f"none of {self.parameters.batch_size} trajectories sampled at {place} is free of collision"
             return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
         if self._is_stuck(controls):
             left = cycle.tracker.remaining
@@ -168,12 +186,14 @@ class MPPIController(PathFollower):
         self._idle_cycles = self._idle_cycles + 1 if idle else 0
         return self._idle_cycles > IDLE_CYCLES
 
-    def planned_motion(self) -> PlannedMotion:
-        """Return the nominal sequence."""
+    def planned_motion(self) -> PlannedMotion | None:
+        """Return the nominal sequence; None where it keeps to the path instead."""
+        if self._keeping.is_keeping:
+            return None
         return PlannedMotion(self._nominal.T.astype(np.float64), self.parameters.model_dt)
 
     # -------------------------------------------------------------------------------------------- optimisation
-    def _optimise(self, cycle: ControlCycle) -> Float32Array | None:
+    def _optimise(self, cycle: ControlCycle, around: MovingAround) -> Float32Array | None:
         """Best velocities (3, steps) around the nominal ones, or None if nothing fits."""
         p, velocities = self.parameters, self._velocities
         add_noise(self._nominal, self._noise[int(self.rng.integers(NOISE_POOL))], self._deviation, velocities)
@@ -183,7 +203,6 @@ class MPPIController(PathFollower):
         costs = score(p.critics, rollouts)
         if rollouts.collided.all():
             return None
-        around = MovingAround.on(self.navigation_map, cycle.request.pose, self.clock.now(), p.moving_objects)
         met = around.meet(rollouts.poses, p.model_dt)
         self._hindered_by = around.hindering(met, costs)
         costs += met.costs
@@ -227,21 +246,3 @@ class MPPIController(PathFollower):
             return Twist.planar(vx, vy, wz)
         angle = math.atan(self.parameters.wheelbase * wz / vx) if abs(vx) > 1e-3 else 0.0
         return AckermannCommand(vx, angle)
-
-
-def smoothing_matrix(steps: int) -> Float32Array:
-    """(steps, steps) matrix that takes a row of controls through the filter, the first and the last one held."""
-    reach = len(SMOOTHING) // 2
-    matrix = np.zeros((steps, steps), dtype=np.float32)
-    for offset, weight in enumerate(SMOOTHING, start=-reach):
-        np.add.at(matrix, (np.clip(np.arange(steps) + offset, 0, steps - 1), np.arange(steps)), weight)
-    return matrix
-
-
-def correlated_noise(rng: np.random.Generator, shape: tuple[int, int, int, int], correlation: float) -> Float32Array:
-    """Unit normal noise (sets, components, steps, samples) whose steps follow each other as an AR(1) process."""
-    noise = rng.standard_normal(shape, dtype=np.float32)
-    fresh = math.sqrt(1.0 - correlation * correlation)
-    for t in range(1, shape[2]):
-        noise[:, :, t] = correlation * noise[:, :, t - 1] + fresh * noise[:, :, t]
-    return noise

@@ -23,6 +23,7 @@ from mbf_abstract.geometry.arithmetic import exp, norm
 from mbf_abstract.geometry.polyline import reverse_segments
 from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
 from mbf_abstract.maps.controllers.failures import missed_path
+from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
 from mbf_abstract.maps.tracking.avoidance import Encounters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
@@ -31,15 +32,14 @@ from mbf_mesh_nav.kernels.mesh.surface_walk import tangent
 from mbf_mesh_nav.kernels.motion.mppi import Critics, SurfacePose, score_rollouts
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
-from mbf_mesh_nav.mesh.positions import vector_of
+from mbf_mesh_nav.mesh.positions import position_text, vector_of
 from mbf_mesh_nav.motion.goal_approach import GoalApproach, braking_speed, clamp, tracker_on_surface
 from mbf_mesh_nav.motion.path_ahead import path_ahead
-from mbf_mesh_nav.motion.sampled_motions import MPPIParameters, SampledMotions
-from mbf_mesh_nav.motion.surface_follower import SurfaceFollower
+from mbf_mesh_nav.motion.sampled_motions import MPPIParameters, SampledMotions, pieces_of_a_step
+from mbf_mesh_nav.motion.surface_follower import SamplingFollower
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.search.final_approach import with_final_approach, with_first_turn
 
-_LEAST_STRIDE = 0.05  # [m] between two looks at the ground; only obstacles without inflation are thinner
 _COLLISION_SCORE = 1e6
 _ROOM_TO_STEER = 1.2  # radius of the approach to the goal, in least turning radii
 _STRICT_RADII = 8.0  # before the goal at which a bent approach begins to be followed ...
@@ -48,7 +48,7 @@ _STANDSTILL = 0.2  # [m] and [rad] gained over the horizon: less than this is no
 _IDLE_CYCLES = 20  # without motion, after which there is none that gets on
 
 
-class MPPIController(SurfaceFollower):
+class MPPIController(SamplingFollower):
     """Sampling controller that avoids what the map shows now."""
 
     Parameters = MPPIParameters
@@ -61,6 +61,12 @@ class MPPIController(SurfaceFollower):
         self._shortest_edge = float(self.mesh_map.neighbour_lengths.min())
         self._ranks_of: tuple[int, float] = (-1, 0.0)  # version of the map and cost limit
         self._ranks: Float32Array = np.zeros(0, dtype=np.float32)
+        self.parameters_changed()
+
+    def parameters_changed(self) -> None:
+        """Take over new limits."""
+        p = self.parameters
+        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0)
 
     @classmethod
     def reach(cls, parameters: MPPIParameters) -> float:
@@ -86,6 +92,7 @@ class MPPIController(SurfaceFollower):
             path = bent
         self._begun, self._idle_cycles = False, 0
         self._follow(path)
+        self._keeping.set_plan(path)
         self._nominal: FloatArray = np.zeros((p.time_steps, 2))
         return True
 
@@ -115,7 +122,7 @@ class MPPIController(SurfaceFollower):
                 self._follow(bent)
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
-        """One cycle: locate, sample around the last motion, score, blend, check."""
+        """One cycle: locate, then sample, or keep to the path."""
         p, pose = self.parameters, request.pose
         cycle = self.begin_cycle(pose, p.max_surface_distance)
         if isinstance(cycle, ControlResult):
@@ -127,28 +134,39 @@ class MPPIController(SurfaceFollower):
         if missed := missed_path(self._tracker, p.max_path_distance * self.limit_factor):
             return missed
         if approach.is_only_turning(pose, self._tracker):
-            off = heading_error(pose, approach.goal)
-            self._idle_cycles += p.motion_model == "ackermann"
-            if self._idle_cycles > _IDLE_CYCLES:
-                message = f"the goal is reached but for {off:.2f} rad, which a car cannot correct where it stands"
-                return ControlResult(ExePathOutcome.NO_VALID_CMD, message)
-            turn = clamp(2.0 * off, p.max_vel_theta)
-            return ControlResult(ExePathOutcome.SUCCESS, "", self._motions.command(0.0, turn))
-        motion = self._best_motion(spot, pose)
+            return self._turn_at_goal(pose, approach)
+        limits = MotionLimits(p.min_vel_x, p.max_vel_x, p.max_vel_theta, p.motion_model == "ackermann")
+        around = MovingAround.on(self.mesh_map, pose, self.clock.now(), p.moving_objects)
+        return self._keeping.choose(request, limits, p.standing, around, lambda: self._sampled(spot, pose, around))
+
+    def _turn_at_goal(self, pose: Pose, approach: GoalApproach) -> ControlResult:
+        """Turn to the goal's heading, which a car cannot do."""
+        p, off = self.parameters, heading_error(pose, approach.goal)
+        self._idle_cycles += p.motion_model == "ackermann"
+        if self._idle_cycles > _IDLE_CYCLES:
+            message = f"the goal is reached but for {off:.2f} rad, which a car cannot correct where it stands"
+            return ControlResult(ExePathOutcome.NO_VALID_CMD, message)
+        turn = clamp(2.0 * off, p.max_vel_theta)
+        return ControlResult(ExePathOutcome.SUCCESS, "", self._motions.command(0.0, turn))
+
+    def _sampled(self, spot: SurfacePoint, pose: Pose, around: MovingAround) -> ControlResult:
+        """Sample around the last motion, score, blend, check."""
+        motion = self._best_motion(spot, pose, around)
         if motion is None:
-            return ControlResult(ExePathOutcome.NO_VALID_CMD, "no sampled motion is collision-free and makes progress")
+            text = f"no motion sampled at {position_text(spot.point)} is collision-free and makes progress"
+            return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
         self._nominal = np.concatenate([motion[1:], motion[-1:]])
         command = self._motions.command(float(motion[0, 0]), float(motion[0, 1]))
         return ControlResult(ExePathOutcome.SUCCESS, "", command, self._hindered_by)
 
     def planned_motion(self) -> PlannedMotion | None:
-        """Return the last motion, without its first step."""
-        if self._approach is None:
+        """Return the last motion, without its first step; None where it keeps to the path instead."""
+        if self._approach is None or self._keeping.is_keeping:
             return None
         speed, yaw_rate = np.moveaxis(self._motions.driven(self._nominal), -1, 0)
         return PlannedMotion(np.stack([speed, np.zeros_like(speed), yaw_rate], axis=1), self.parameters.model_dt)
 
-    def _best_motion(self, spot: SurfacePoint, pose: Pose) -> FloatArray | None:
+    def _best_motion(self, spot: SurfacePoint, pose: Pose, around: MovingAround) -> FloatArray | None:
         """Blend the sampled motions by their scores; (time_steps, 2), or None if no motion makes progress."""
         max_speed = min(
             self.parameters.max_vel_x, max(braking_speed(self._tracker.to_cusp, self.parameters.decel_lim_x), 0.1)
@@ -158,7 +176,6 @@ class MPPIController(SurfaceFollower):
         to_end = float(norm(end - spot.point))
         room = max(self._tracker.to_cusp, to_end)
         controls = self._motions.sampled(self.rng, self._nominal, max_speed, room, reverses=self._reverses)
-        around = MovingAround.on(self.mesh_map, pose, self.clock.now(), self.parameters.moving_objects)
         scores, collided, met = self._score(controls, spot, pose, around)
         scores = np.where(collided, scores + _COLLISION_SCORE, scores)
         self._hindered_by = around.hindering(met, scores)
@@ -196,7 +213,7 @@ class MPPIController(SurfaceFollower):
         assert self._approach is not None
         p, mesh_map = self.parameters, self.mesh_map
         snapshot = mesh_map.snapshot()
-        pieces = self._pieces_of_a_step()
+        pieces = pieces_of_a_step(p, self._shortest_edge)
         motions = np.repeat(self._motions.driven(controls), pieces, axis=1)
         heading = tangent(vector_of(pose.rotation[:, 0]), vector_of(mesh_map.face_normals[spot.face]))
         poses = np.empty((3, motions.shape[1] if around.anybody else 0, len(motions)), dtype=np.float32)
@@ -219,16 +236,6 @@ class MPPIController(SurfaceFollower):
         path_weight = (_STRICTNESS if self._tracker.remaining < self._strict_below else 1.0) * p.path_weight
         weights = path_weight, p.cost_weight, p.tilt_weight, p.turn_weight, p.goal_weight, p.heading_weight
         return Critics(np.array(weights), p.roll_limit, p.pitch_limit)
-
-    def _pieces_of_a_step(self) -> int:
-        """Into how many pieces a step is cut, so that none leads from one side of a thin wall to the other.
-
-        Forbidden is the ground half an edge on both sides of a row of lethal vertices; the row may run where the mesh
-        is finest.
-        """
-        p = self.parameters
-        stride = max(p.max_vel_x, -p.min_vel_x) * p.model_dt
-        return math.ceil(stride / max(0.5 * self._shortest_edge, _LEAST_STRIDE))
 
     def _blocked(self) -> BoolArray:
         """Vertices (V,) that no curve may pass near."""

@@ -10,11 +10,13 @@ import numpy as np
 
 from mbf_abstract.geometry import AckermannCommand, Command, Twist
 from mbf_abstract.geometry.arithmetic import tan
+from mbf_abstract.maps.controllers.standing import StandingParameters
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.motion.goal_approach import clamp
 
+_LEAST_STRIDE = 0.05  # [m] between two looks at the ground; only obstacles without inflation are thinner
 _NOISE_HOLD = 3  # steps a noise value is kept for: explores further than independent noise of the same size
 
 
@@ -51,6 +53,7 @@ class MPPIParameters(PluginParameters):
         1.0, "Farther from the surface than this the robot is out of the map.", unit="m", gt=0.0
     )
     moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
+    standing: StandingParameters = parameter(StandingParameters(), "What it does where its motions get it nowhere.")
 
 
 @dataclass(frozen=True)
@@ -118,3 +121,13 @@ class SampledMotions:
         if self.parameters.motion_model == "differential":
             return Twist.planar(vx=speed, wz=turn)
         return AckermannCommand(speed, clamp(turn, self.steering_limit))
+
+
+def pieces_of_a_step(p: MPPIParameters, shortest_edge: float) -> int:
+    """Into how many pieces a step is cut, so that none leads from one side of a thin wall to the other.
+
+    Forbidden is the ground half an edge on both sides of a row of lethal vertices; the row may run where the mesh is
+    finest, with edges of ``shortest_edge`` [m].
+    """
+    stride = max(p.max_vel_x, -p.min_vel_x) * p.model_dt
+    return math.ceil(stride / max(0.5 * shortest_edge, _LEAST_STRIDE))

@@ -5,11 +5,12 @@ from __future__ import annotations
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.controllers.failures import no_path, outside_map
+from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath
 from mbf_abstract.plugins import ControlResult
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.motion.goal_approach import GoalApproach
-from mbf_mesh_nav.plugins import MeshController
+from mbf_mesh_nav.plugins import MeshContext, MeshController
 
 
 class SurfaceFollower(MeshController):
@@ -34,3 +35,16 @@ class SurfaceFollower(MeshController):
         if self._approach is None:
             return False
         return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
+
+
+class SamplingFollower(SurfaceFollower):
+    """One that samples motions, and keeps to its path where they get the robot nowhere."""
+
+    def __init__(self, context: MeshContext) -> None:
+        super().__init__(context)
+        self._keeping = KeepingToPath(context)
+
+    def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
+        """As for all; whoever keeps to the path needs the tolerances, too."""
+        self._keeping.update(pose, dist_tolerance, angle_tolerance)
+        return super().is_goal_reached(pose, dist_tolerance, angle_tolerance)

@@ -1,12 +1,15 @@
 """What a planner calls a path its controller accepts, on the small random worlds of ``benchmarks/agreement.py``."""
 
+import re
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
 
-from mbf_abstract.plugins import PlanRequest, PluginKind
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
 
 pytestmark = pytest.mark.usefixtures("one_core")
 
@@ -15,6 +18,7 @@ SPEC = spec_from_file_location("agreement", SOURCE)
 agreement = sys.modules["agreement"] = module_from_spec(SPEC)
 sys.path.insert(0, str(SOURCE.parent))  # it imports its worlds
 SPEC.loader.exec_module(agreement)
+worlds = sys.modules["agreement_worlds"]
 sys.path.remove(str(SOURCE.parent))
 
 PLANNED = range(8)
@@ -31,8 +35,16 @@ AT_LIMITS = (
     ("mesh", "dijkstra", 65, True), ("mesh", "dijkstra", 84, False), ("mesh", "dijkstra", 104, True),
 )  # fmt: skip
 """Paths along a free end of the map, or towards a wall to a goal beside it; whether no walls stand around."""
+STOOD = (
+    ("costmap", "hybrid_astar", "dwa", 302), ("costmap", "theta_star", "dwa", 302),
+    ("costmap", "hybrid_astar", "mppi", 302), ("costmap", "dijkstra", "mppi", 304), ("costmap", "astar", "dwa", 304),
+    ("costmap", "hybrid_astar", "dwa", 304), ("costmap", "hybrid_astar", "rotation_shim", 304),
+    ("mesh", "dijkstra", "mppi", 65), ("mesh", "dijkstra", "mppi", 67),
+)  # fmt: skip
+"""Drives with sampled motions that stood before their goal until their time was over, crept, or touched something."""
+SAMPLING = (("costmap", "dwa"), ("costmap", "mppi"), ("costmap", "rotation_shim"), ("mesh", "mppi"))
 FOLLOWERS = {"regulated_pure_pursuit", "follow_path", "path_follower"}
-"""Controllers that keep to their path; those that sample motions may leave it, and are only counted."""
+"""Controllers that keep to their path; those that sample motions may leave it."""
 
 
 def every_planner():
@@ -75,3 +87,37 @@ def test_a_plan_along_the_end_of_the_map_or_to_beside_a_wall_is_driven(backend, 
     made = world.plugin(PluginKind.PLANNER, planner), world.plugin(PluginKind.CONTROLLER, "follow_path")
     verdict = agreement.drive(world, *made)
     assert verdict.ending == "arrived", verdict
+
+
+@pytest.mark.parametrize(("backend", "planner", "controller", "seed"), STOOD)
+def test_sampled_motions_arrive_where_room_is_narrow_and_touch_nothing(backend, planner, controller, seed):
+    world = agreement.WORLDS[backend](seed)
+    made = world.plugin(PluginKind.PLANNER, planner), world.plugin(PluginKind.CONTROLLER, controller)
+    verdict = agreement.drive(world, *made)
+    assert verdict.ending == "arrived", verdict
+
+
+@pytest.mark.parametrize(("backend", "controller"), SAMPLING)
+def test_a_robot_that_no_motion_gets_on_stands_for_a_stated_time_then_says_where(backend, controller):
+    walls, wall = worlds.WALLS, worlds.Box(3.0, 3.2, 0.0, worlds.SIDE)
+    world = agreement.WORLDS[backend](0)
+    world.build([*walls])
+    start, goal = world.pose_on(1.5, 3.0, 0.0), world.pose_on(4.5, 3.0, 0.0)
+    plan = world.plugin(PluginKind.PLANNER, "dijkstra").make_plan(PlanRequest(start, goal))
+    world.build([*walls, wall])  # somebody closed it since
+    driver = world.plugin(PluginKind.CONTROLLER, controller)
+    assert driver.set_plan(plan.path)
+    track, result = [start], None
+    while (result is None or result.success) and world.clock.time < 60.0:
+        velocity = result.command if result else Twist()
+        driver.is_goal_reached(track[-1], 0.1, 0.2)
+        result = driver.compute_velocity_commands(ControlRequest(track[-1], velocity))
+        world.clock.time += agreement.PERIOD
+        track.append(world.moved(track[-1], result.command or Twist()))
+        assert world.fits(track[-1])
+    assert result.outcome == ExePathOutcome.NO_VALID_CMD, result
+    x, y = map(float, re.search(r"\((-?[0-9.]+), (-?[0-9.]+)", result.message).groups())
+    assert track[-1].distance_to(Pose.planar(x, y, 0.0, track[-1].z)) < 0.1, result.message
+    came = next(k for k, pose in enumerate(track) if pose.distance_to(track[-1]) < 0.1)
+    # It may creep by as much as once counts as getting on, before it stands for good.
+    assert (len(track) - came) * agreement.PERIOD < 12.0

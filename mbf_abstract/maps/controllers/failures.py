@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult
 
@@ -23,6 +24,12 @@ def missed_path(tracker: PathTracker, allowed: float) -> ControlResult | None:
         return None
     message = f"the robot is {tracker.deviation:.2f} m from the path, allowed are {allowed:g} m"
     return ControlResult(ExePathOutcome.MISSED_PATH, message)
+
+
+def stands(pose: Pose, seconds: float, reason: str = "") -> ControlResult:
+    """Failure of a controller none of whose motions gets the robot on; ``reason`` is why its path itself does not."""
+    text = f"no motion has got the robot on from ({pose.x:.2f}, {pose.y:.2f}) for {seconds:.1f} s"
+    return ControlResult(ExePathOutcome.NO_VALID_CMD, f"{text}; along its path: {reason}" if reason else text)
 
 
 def outside_map(place: str, limits: str = "") -> ControlResult:

@@ -76,6 +76,7 @@ class FollowPath(MapPlugin, AbstractController):
     _tracker: PathTracker | None = None
     _room_to_turn = RoomToTurn()
     _turn_at_goal = TurnAtGoal(AT_END)
+    _dist_tolerance = 0.0
 
     @property
     def turns_on_the_spot(self) -> bool:
@@ -127,6 +128,7 @@ class FollowPath(MapPlugin, AbstractController):
         tracker = self._tracker
         if tracker is None:
             return False
+        self._dist_tolerance = dist_tolerance
         self._turn_at_goal.take_tolerances(dist_tolerance, angle_tolerance)
         tracker.update((pose.x, pose.y))
         gap, turn = self._from_goal(pose, tracker)
@@ -172,7 +174,13 @@ class FollowPath(MapPlugin, AbstractController):
         return gap * angle / math.sin(angle) if angle > 0.0 else gap
 
     def _along_path(self, pose: Pose, tracker: PathTracker, reach: float) -> list[Twist]:
-        """Motions that keep to the path, if the outline fits on it over ``reach`` [m]."""
+        """Motions that keep to the path, if the outline fits on it over ``reach`` [m].
+
+        A robot that cannot come nearer to its goal, but stands within its tolerance, only turns to its heading.
+        """
+        gap, turn = self._from_goal(pose, tracker)
+        if gap <= self._dist_tolerance and tracker.has_arrived(self._dist_tolerance) and abs(turn) > SMALL_TURN:
+            return [self._turn(turn)]
         backward, check = self._backward(tracker), self.navigation_map.pose_check(AS_CONFIGURED)
         for x, y, yaw in poses_ahead(tracker, reach, backward).tolist():
             place = Pose.planar(x, y, yaw, pose.z, pose.frame_id, pose.stamp)

@@ -1,0 +1,188 @@
+"""Where a controller that samples motions keeps to its path instead: in narrow places, and where it got nowhere.
+
+When to use: in every controller that chooses the best of sampled motions, on all maps. Near a wall the cheapest motion
+is often to stand: the price of the costs there outweighs what is left of the path. And samples cut the strokes of a
+manoeuvre, which fits only as it was planned. When not: cars, which ``follow_path`` cannot drive; they only give up.
+
+Rule: a path is driven as ``follow_path`` drives it, with the limits of the controller, before a place where the robot
+has to stop or reverse but cannot turn; and where the samples have stood for a while, or failed, until the robot is
+``AWAY`` from there. Where that is blocked or would meet somebody who moves, the samples decide. A robot that still
+stands after longer gets no command any more, but the failure NO_VALID_CMD with its place.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import FloatArray, Path, Pose, Twist
+from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.controllers.failures import stands
+from mbf_abstract.maps.controllers.follow_path import FollowPath, FollowPathParameters
+from mbf_abstract.maps.controllers.standing import Standing, StandingParameters
+from mbf_abstract.maps.map_plugin import MapContext
+from mbf_abstract.maps.tracking.avoidance import MovingAround
+from mbf_abstract.plugins import ControlRequest, ControlResult
+
+AWAY = 0.5
+"""So far [m] from where it stood the robot samples again."""
+FARTHEST = 100.0
+"""However far [m] from its path the robot is, that is for the controller to judge."""
+LOOK, LOOK_STEP = 1.5, 0.1
+"""Time [s] over which motions along the path are compared with what moves, and between two looks."""
+HEADINGS = np.arange(16) * (math.pi / 8.0)
+"""Where the outline fits with all of these [rad], the robot can turn."""
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """What a controller may command in one cycle.
+
+    Attributes
+    ----------
+    slowest, fastest : float
+        Least and largest speed [m/s]; negative = backward.
+    turning : float
+        Largest yaw rate [rad/s].
+    is_car : bool
+        Whether the robot cannot turn on the spot.
+    gain, turn_gain : float
+        By how much [m/s, rad/s] a speed or yaw rate may exceed the measured one.
+    """
+
+    slowest: float
+    fastest: float
+    turning: float
+    is_car: bool = False
+    gain: float = math.inf
+    turn_gain: float = math.inf
+
+    def hold(self, command: Twist, measured: Twist) -> Twist:
+        """The same arc within the limits."""
+        speed, turn = abs(command.vx), abs(command.wz)
+        fastest = min(self.fastest if command.vx >= 0.0 else -self.slowest, abs(measured.vx) + self.gain)
+        turning = min(self.turning, abs(measured.wz) + self.turn_gain)
+        share = min(fastest / speed if speed > fastest else 1.0, turning / turn if turn > turning else 1.0)
+        return Twist.planar(share * command.vx, 0.0, share * command.wz)
+
+
+class KeepingToPath:
+    """The choice between sampled motions and the path, from cycle to cycle.
+
+    Parameters
+    ----------
+    context : MapContext
+        Of the controller.
+    """
+
+    def __init__(self, context: MapContext[Any]) -> None:
+        self._follower = FollowPath(replace(context, name=f"{context.name}.path", parameters=FollowPathParameters()))
+        self._standing = Standing()
+        self._stood_at: Pose | None = None
+        self.is_keeping = False
+        """Whether the last command was one along the path."""
+
+    def drive_with(self, max_vel_x: float, max_vel_theta: float, *, allow_reversing: bool) -> None:
+        """Take over the limits [m/s, rad/s] of the controller."""
+        self._follower.parameters = FollowPathParameters(
+            max_vel_x=max_vel_x,
+            max_vel_theta=max_vel_theta,
+            allow_reversing=allow_reversing,
+            max_path_distance=FARTHEST,
+        )
+
+    def set_plan(self, path: Path) -> None:
+        """Take over a path. Where the robot stood is remembered, however often it is planned anew."""
+        self._follower.set_plan(path)
+
+    def update(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> None:
+        """Take over the progress, and the tolerances [m, rad] of the goal."""
+        self._follower.is_goal_reached(pose, dist_tolerance, angle_tolerance)
+
+    def choose(
+        self,
+        request: ControlRequest,
+        limits: MotionLimits,
+        p: StandingParameters,
+        around: MovingAround,
+        sampled: Callable[[], ControlResult],
+        is_narrow: Callable[[], bool] = lambda: False,
+        accepts: Callable[[Twist], bool] = lambda command: True,
+    ) -> ControlResult:
+        """The answer of this cycle.
+
+        Parameters
+        ----------
+        request : ControlRequest
+            In the frame of the path.
+        around : MovingAround
+            What moves around the robot.
+        sampled : callable
+            The answer of the controller's samples.
+        is_narrow : callable
+            Whether the path ahead can only be driven as it is.
+        accepts : callable
+            Whether a command along the path keeps to what the samples may enter; ``follow_path`` asks for its outline.
+        """
+        now = self._follower.clock.now()
+        stood = self._standing.time(now, limits.fastest, limits.turning)
+        along, reason = None, ""
+        keeps = not limits.is_car and (self._has_stood(request.pose, stood >= p.keep_to_path_after) or is_narrow())
+        if keeps:
+            along, reason = self._along_path(request, limits, around, accepts)
+        result = along or sampled()
+        if not (result.success or keeps or limits.is_car):
+            along, _ = self._along_path(request, limits, around, accepts)
+            self._stood_at = request.pose if along else self._stood_at
+            result = along or result
+        self.is_keeping = along is not None
+        if stood >= p.give_up_after and result.success and not result.hindered_by:
+            result = stands(request.pose, stood, reason)
+        if result.hindered_by or not result.success:
+            self._standing.restart(now)
+        self._standing.commanded(result.command)
+        return result
+
+    def _has_stood(self, pose: Pose, stands_now: bool) -> bool:
+        """Whether the robot stands, or has not come away yet from where it did."""
+        if stands_now:
+            self._stood_at = pose
+        elif self._stood_at is not None and pose.distance_to(self._stood_at) > AWAY:
+            self._stood_at = None
+        return self._stood_at is not None
+
+    def _along_path(
+        self, request: ControlRequest, limits: MotionLimits, around: MovingAround, accepts: Callable[[Twist], bool]
+    ) -> tuple[ControlResult | None, str]:
+        """The answer that keeps to the path; None, and why, where it is blocked or somebody comes."""
+        answer = self._follower.compute_velocity_commands(request)
+        if not isinstance(answer.command, Twist) or not answer.success:
+            return None, answer.message
+        command = limits.hold(answer.command, request.velocity)
+        if not accepts(command):
+            return None, "it costs too much"
+        if around.anybody:
+            driven = arc_poses((0.0, 0.0, around.yaw), command.vx, 0.0, command.wz, LOOK, LOOK_STEP)
+            if around.meet(np.ascontiguousarray(driven.T[:, :, None], dtype=np.float32), LOOK_STEP).touches[0]:
+                return None, "somebody comes"
+        return replace(answer, command=command), ""
+
+
+def cannot_turn_ahead(tracker: PathTracker, reach: float, fits: Callable[[FloatArray], bool]) -> bool:
+    """Whether the robot stops or reverses within ``reach`` [m] where it cannot turn.
+
+    Parameters
+    ----------
+    fits : callable
+        Whether the outline touches nothing at poses (n, 3: x, y [m], yaw [rad]).
+    """
+    near = (tracker.cusps >= tracker.progress) & (tracker.cusps <= tracker.progress + reach)
+    for x, y in tracker.points_at(tracker.cusps[near])[:, :2].tolist():
+        if not fits(np.column_stack([np.full(len(HEADINGS), x), np.full(len(HEADINGS), y), HEADINGS])):
+            return True
+    return False

@@ -1,0 +1,97 @@
+"""The base of controllers that sample motions: where they keep to their path, and when they give up.
+
+The rule is that of ``mbf_abstract.maps.controllers.keeping_to_path``, shared with the meshes.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import replace
+
+from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath, MotionLimits, cannot_turn_ahead
+from mbf_abstract.maps.controllers.standing import StandingParameters
+from mbf_abstract.maps.tracking.avoidance import MovingAround
+from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_costmap_nav.control.path_handling import ControlCycle, PathFollower
+from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
+from mbf_costmap_nav.plugins import CostmapContext
+
+LOOK, LOOK_STEP = 0.5, 0.1  # s
+AHEAD = 2.0
+"""A place where the robot cannot turn counts so many radii of its outline ahead."""
+
+
+class SamplingFollower(PathFollower):
+    """A controller whose ``sampled`` is one cycle of it."""
+
+    def __init__(self, context: CostmapContext) -> None:
+        super().__init__(context)
+        self._keeping = KeepingToPath(context)
+
+    @property
+    @abstractmethod
+    def standing(self) -> StandingParameters:
+        """What it does where its samples get the robot nowhere."""
+
+    @abstractmethod
+    def limits(self, cycle: ControlCycle) -> MotionLimits:
+        """What it may command in this cycle."""
+
+    @abstractmethod
+    def moving_around(self, cycle: ControlCycle) -> MovingAround:
+        """What moves around the robot."""
+
+    @abstractmethod
+    def sampled(self, cycle: ControlCycle, around: MovingAround) -> ControlResult:
+        """The best of the sampled motions."""
+
+    def set_plan(self, path: Path) -> bool:
+        """Take over a path."""
+        accepted = super().set_plan(path)
+        if accepted:
+            self._keeping.set_plan(path)
+        return accepted
+
+    def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
+        """As for all; whoever keeps to the path needs the tolerances, too."""
+        self._keeping.update(pose, dist_tolerance, angle_tolerance)
+        return super().is_goal_reached(pose, dist_tolerance, angle_tolerance)
+
+    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+        """Sample, or keep to the path."""
+        cycle = self.begin_cycle(request)
+        if isinstance(cycle, ControlResult):
+            return cycle
+        assert self.tracker is not None
+        around = self.moving_around(cycle)
+        pose = self.transforms.transform_pose(request.pose, self.tracker.path.frame_id)
+        return self._keeping.choose(
+            replace(request, pose=pose),
+            self.limits(cycle),
+            self.standing,
+            around,
+            lambda: self.sampled(cycle, around),
+            lambda: self._is_narrow(cycle),
+            lambda command: keeps_centre_free(cycle, command),
+        )
+
+    def _is_narrow(self, cycle: ControlCycle) -> bool:
+        """Whether the robot stops or reverses near ahead where it cannot turn."""
+        footprint = cycle.footprint
+        if math.isclose(footprint.footprint.circumscribed_radius, footprint.footprint.inscribed_radius, rel_tol=0.1):
+            return False  # a round one turns where it fits
+        reach = AHEAD * footprint.footprint.circumscribed_radius
+        return cannot_turn_ahead(
+            cycle.tracker, reach, lambda poses: footprint.first_collision(cycle.costmap, poses) < 0
+        )
+
+
+def keeps_centre_free(cycle: ControlCycle, command: Twist) -> bool:
+    """Whether the robot's centre stays below the inscribed cost for as long as a command is looked ahead."""
+    pose = cycle.request.pose
+    driven = arc_poses((pose.x, pose.y, pose.yaw), command.vx, 0.0, command.wz, LOOK, LOOK_STEP)
+    costs = [cycle.costmap.cost_at(x, y) for x, y, _ in driven.tolist()]
+    return all(cost is None or cost < INSCRIBED or cost == UNKNOWN for cost in costs)
