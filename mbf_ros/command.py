@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, READ_ONLY, TOKEN, refuse_without
+from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, ORIGIN, READ_ONLY, TOKEN, foxglove_of
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.commands.waiting import waiting
 from mbf_ros.ending import Parent, wait_for_ctrl_c
@@ -72,17 +72,15 @@ def serve(
     foxglove_origin: list[str] = ORIGIN,
 ) -> None:
     """Serve a navigator, or a simulated robot alone, to clients of rosbridge, until Ctrl-C."""
-    if not foxglove:
-        refuse_without(context, "--foxglove", *NAMES)
     parent = Parent()
     with readable_errors():
-        from mbf_abstract.access.foxglove import FoxgloveOptions, live_robot
+        from mbf_abstract.access.foxglove import live_robot
         from mbf_abstract.access.server_options import ServerOptions
         from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
         from mbf_ros.rosbridge_robot.simulated_robot import serve_robot
         from mbf_ros.sensor_options import sensors_of
 
-        app = FoxgloveOptions.given(foxglove, foxglove_at, foxglove_token, foxglove_read_only, foxglove_origin)
+        app = foxglove_of(context)
         access = _access(host, token)
         server_options = ServerOptions(access, port, tuple(allow_origin), max_message)
         options = BridgeOptions(server_options, not keep_goals, stamped, sensors_of(sensor), map_period)

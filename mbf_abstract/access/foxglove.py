@@ -6,7 +6,7 @@ A package that can show a robot live offers a function by an entry point of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from importlib.metadata import entry_points
@@ -59,13 +59,6 @@ class FoxgloveOptions:
         """Return the options of the server, with new tokens each time."""
         access = (PageAccess.by_token if self.token else PageAccess.open)(self.host, self.read_only)
         return ServerOptions(access, self.port, (APP, *self.origins), MAX_MESSAGE, ports=PORTS_TRIED)
-
-    @classmethod
-    def given(
-        cls, wanted: bool, address: str, token: bool, read_only: bool, origins: Sequence[str]
-    ) -> FoxgloveOptions | None:
-        """Return the options of a command line, None where the server is not wanted; raises ValueError."""
-        return cls(*parsed_address(address), token, read_only, tuple(origins)) if wanted else None
 
 
 def parsed_address(text: str) -> tuple[str, int]:

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import typer
+
+if TYPE_CHECKING:
+    from mbf_abstract.access.foxglove import FoxgloveOptions
 
 FOXGLOVE = typer.Option(False, "--foxglove", help="Serve it live to Foxglove's app; see docs/foxglove.md.")
 AT = typer.Option(
@@ -13,8 +18,18 @@ TOKEN = typer.Option(
 )
 READ_ONLY = typer.Option(False, "--foxglove-read-only", help="Watching only, no steering.")
 ORIGIN = typer.Option([], "--foxglove-origin", help="Origin of another web app that may connect; repeatable.")
-NAMES = ("foxglove_at", "foxglove_token", "foxglove_read_only", "foxglove_origin")
-"""Of the parameters that go with ``--foxglove`` only."""
+
+
+def foxglove_of(context: typer.Context) -> FoxgloveOptions | None:
+    """Return what these options of a command ask for, None without ``--foxglove``; raises ValueError."""
+    given = context.params
+    if not given["foxglove"]:
+        refuse_without(context, "--foxglove", *(name for name in given if name.startswith("foxglove_")))
+        return None
+    from mbf_abstract.access.foxglove import FoxgloveOptions, parsed_address
+
+    token, read_only, origins = (given[f"foxglove_{name}"] for name in ("token", "read_only", "origin"))
+    return FoxgloveOptions(*parsed_address(given["foxglove_at"]), token, read_only, tuple(origins))
 
 
 def refuse_without(context: typer.Context, needed: str, *names: str) -> None:

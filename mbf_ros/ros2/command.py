@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, READ_ONLY, TOKEN, refuse_without
+from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, ORIGIN, READ_ONLY, TOKEN, foxglove_of
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from mbf_abstract.commands.waiting import waiting
 from mbf_ros.ending import Parent, noticed_ctrl_c, shown_state
@@ -50,16 +50,14 @@ def ros2(
     ),
 ) -> None:
     """Serve a navigator as the ROS 2 node move_base_flex, until Ctrl-C."""
-    if not foxglove:
-        refuse_without(context, "--foxglove", *NAMES)
     parent = Parent()
     with readable_errors():
-        from mbf_abstract.access.foxglove import FoxgloveOptions, live_robot
+        from mbf_abstract.access.foxglove import live_robot
         from mbf_ros.ros2.node import navigation_node
         from mbf_ros.ros2.options import NodeOptions
         from mbf_ros.sensor_options import sensors_of
 
-        app = FoxgloveOptions.given(foxglove, foxglove_at, foxglove_token, foxglove_read_only, foxglove_origin)
+        app = foxglove_of(context)
         options = NodeOptions(
             stamped,
             max_silence or None,

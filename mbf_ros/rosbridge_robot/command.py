@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, READ_ONLY, TOKEN, refuse_without
+from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, ORIGIN, READ_ONLY, TOKEN, foxglove_of
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_ros.ending import Parent, shown_state, wait_for_ctrl_c
 from mbf_ros.rosbridge_robot.options import LinkOptions, RobotOptions, TimeSource
@@ -40,15 +40,13 @@ def connect(
     foxglove_origin: list[str] = ORIGIN,
 ) -> None:
     """Navigate a robot through its rosbridge server, until Ctrl-C."""
-    if not foxglove:
-        refuse_without(context, "--foxglove", *NAMES)
     parent = Parent()
     with readable_errors():
-        from mbf_abstract.access.foxglove import FoxgloveOptions, live_robot
+        from mbf_abstract.access.foxglove import live_robot
         from mbf_ros.rosbridge_robot.navigator import connect_navigator
         from mbf_ros.sensor_options import sensors_of
 
-        app = FoxgloveOptions.given(foxglove, foxglove_at, foxglove_token, foxglove_read_only, foxglove_origin)
+        app = foxglove_of(context)
         link = LinkOptions(secret=secret_file.read_text("utf-8").strip() if secret_file else "")
         options = RobotOptions(link, stamped, max_silence or None, sensors_of(sensor), cloud_period, time)
         with connect_navigator(address, config, options, _warn) as navigator:

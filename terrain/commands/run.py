@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING
 import typer
 
 from mbf_abstract.commands.completion import complete_backend, complete_controller, complete_planner
-from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, NAMES, ORIGIN, READ_ONLY, TOKEN, refuse_without
+from mbf_abstract.commands.foxglove_options import (
+    AT,
+    FOXGLOVE,
+    ORIGIN,
+    READ_ONLY,
+    TOKEN,
+    foxglove_of,
+    refuse_without,
+)
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from terrain.commands.command_line import command_line
 from terrain.commands.compare import compare
@@ -111,8 +119,6 @@ def run(
     for a mistake in scenario, configuration or arguments.
     """
     chosen = settings_of(settings, planner=planner, controller=controller)
-    if not foxglove:
-        refuse_without(context, "--foxglove", *NAMES)
     if not ros2:
         refuse_without(context, "--ros2", "ros2_stamped", "ros2_lockstep", "ros2_patience")
     folder = out or new_run_folder(RUNS, datetime.now())
@@ -121,6 +127,7 @@ def run(
         from terrain.session.runner import RunOptions
         from terrain.viewer.results import write_joint_results, write_results
 
+        app = foxglove_of(context)
         with LiveLine(show=not (quiet or as_json)) as live:
             options = RunOptions(
                 folder=folder,
@@ -137,12 +144,10 @@ def run(
                 write_joint_views=partial(write_joint_results, on_step=live.step),
             )
             if view or foxglove:
-                from mbf_abstract.access.foxglove import FoxgloveOptions
                 from terrain.commands.watching import watched
                 from terrain.viewer.live.session import ViewOptions
 
                 page = ViewOptions(view_host, view_port, view_speed, view_token, view_read_only)
-                app = FoxgloveOptions.given(foxglove, foxglove_at, foxglove_token, foxglove_read_only, foxglove_origin)
                 options = watched(replace(options, stay=stay), page if view else None, app, view_speed, live, show)
             if ros2:
                 from terrain.commands.robot_on_ros import driven_over_ros
