@@ -187,7 +187,7 @@ class WebSocketServer(Generic[AnyVisitor]):
             async for frame in connection:
                 self._service.take(client, frame)
                 if client.outbox.overflowed:
-                    client.hang_up("too many answers wait to be read")
+                    client.hang_up("too many unread answers")
                     break
                 await asyncio.sleep(0)  # a client that sends without a pause leaves the others their turns
         except ConnectionClosed:

@@ -214,6 +214,6 @@ class _TaskRun:
             text = f"{self._job.handle.cancel_reason}; the task at waypoint {self._waypoint} has not ended yet"
             self._job.abandon(MoveBaseOutcome.CANCELED, text)
         else:
-            text = f"the task at waypoint {self._waypoint} kept the clock standing for too long (hang_guard)"
+            text = f"the task at waypoint {self._waypoint} stopped the clock for too long (hang_guard)"
             self._job.abandon(MoveBaseOutcome.INTERNAL_ERROR, text)
         return None

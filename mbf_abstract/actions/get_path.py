@@ -129,7 +129,7 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         if state is PlannerState.CANCELED:
             return GetPathResult(GetPathOutcome.CANCELED, handle.cancel_reason, **fields)
         if state is PlannerState.PAT_EXCEEDED:
-            tail = f"; the planner said last: {last.message}" if last.message else ""
+            tail = f"; last message of the planner: {last.message}" if last.message else ""
             return GetPathResult(GetPathOutcome.PAT_EXCEEDED, f"no plan within {self.patience:g} s{tail}", **fields)
         return GetPathResult(int(last.outcome), last.message, cost=last.cost, permanent=last.permanent, **fields)
 

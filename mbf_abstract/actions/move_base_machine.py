@@ -199,7 +199,7 @@ class MoveBaseMachine:
         if self._oscillation.check(
             pose, parameters.oscillation_timeout, parameters.oscillation_distance, parameters.oscillation_angle
         ):
-            text = f"the robot got nowhere in {parameters.oscillation_timeout:g} s"
+            text = f"the robot has made no progress in {parameters.oscillation_timeout:g} s"
             self._stop_then_recover(Trigger.OSCILLATION, (MoveBaseOutcome.OSCILLATION, text))
         return None
 

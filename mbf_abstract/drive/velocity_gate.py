@@ -67,7 +67,7 @@ class Lease:
         with self._condition:
             if not self.active or self._writer.stands:
                 return
-            self._emit(EventKind.ROBOT_STOPPED, reason="asked by the lease's owner")
+            self._emit(EventKind.ROBOT_STOPPED, reason="requested by the lease's owner")
             stop = self._writer.begin_stop()
         self._writer.deliver(stop)
 
@@ -112,7 +112,7 @@ class Lease:
             return "the lease is over"
         if self.paused:
             return "the lease is paused"
-        return "the robot's send_command() has not come back from an earlier command" if self._writer.busy else ""
+        return "the robot's send_command() has not returned from an earlier command" if self._writer.busy else ""
 
     def _limited(self, command: Command) -> Command:
         limited = self._gate.limits.apply(command)

@@ -38,7 +38,7 @@ class ControllerExecution:
         Supervises the plugin calls; its patience watch is restarted by every valid command.
     take_new_plan : callable
         Answers a plan that came for this running execution, at most once each, else None; raises TransformError for
-        a path that can not be brought into the global frame.
+        a path that cannot be transformed to the global frame.
     on_cycle : callable
         Called with the robot's pose and the result of every cycle that asked the plugin, e.g. to publish feedback.
 
@@ -259,7 +259,7 @@ class ControllerExecution:
         except PluginNonFinite as error:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, str(error))
         if result.success and result.command is None:
-            result = ControlResult(ExePathOutcome.NO_VALID_CMD, "success, but no command")
+            result = ControlResult(ExePathOutcome.NO_VALID_CMD, "the controller reported success but gave no command")
         elif result.success:
             result = self._avoid_contact(pose, self._runtime.velocity_or_command(measured), result)
         self.last_result = result
@@ -321,7 +321,8 @@ class ControllerExecution:
 
     def _patience_end(self) -> ControllerEnd:
         last = self.last_result.message if self.last_result is not None else ""
-        text = f"no valid command for {self._run.patience:g} s" + (f"; the controller said: {last}" if last else "")
+        tail = f"; last message of the controller: {last}" if last else ""
+        text = f"no valid command for {self._run.patience:g} s{tail}"
         return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, text)
 
     def _end(self, state: ControllerState, outcome: int, message: str) -> ControllerEnd:

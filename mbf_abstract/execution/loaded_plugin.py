@@ -89,7 +89,7 @@ class LoadedPlugin(Generic[P]):
             self._user = None
             if self.quarantined:
                 self.quarantined = ""
-                self._runtime.events.emit(EventKind.QUARANTINE, self.name, reason="ended: the late call came back")
+                self._runtime.events.emit(EventKind.QUARANTINE, self.name, reason="ended: the late call returned")
             self._condition.notify_all()
 
     def quarantine(self, user: object, reason: str) -> None:

@@ -63,7 +63,7 @@ class MotionWatch:
             pose, parameters.oscillation_timeout, parameters.oscillation_distance, parameters.oscillation_angle
         ):
             return ExePathOutcome.OSCILLATION, (
-                f"the robot has not moved {parameters.oscillation_distance:g} m "
+                f"the robot has neither moved {parameters.oscillation_distance:g} m "
                 f"nor turned {parameters.oscillation_angle:g} rad in {parameters.oscillation_timeout:g} s"
             )
         if self._progress.check(pose, tracker, parameters.progress_timeout):

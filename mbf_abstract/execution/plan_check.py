@@ -52,7 +52,7 @@ def check_path(answer: PlanResult, request: PlanRequest, runtime: Runtime, area:
     try:
         path = path_in_global_frame(answer.path, runtime)
     except TransformError as error:
-        return PlanResult(GetPathOutcome.TF_ERROR, f"the path can not be brought into the global frame: {error}")
+        return PlanResult(GetPathOutcome.TF_ERROR, f"the path cannot be transformed to the global frame: {error}")
     if area is not None and not area.contains(path[-1]):
         text = f"the path ends at {path[-1].position}, outside the goal area"
         return PlanResult(GetPathOutcome.INTERNAL_ERROR, text)

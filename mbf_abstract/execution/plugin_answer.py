@@ -30,7 +30,7 @@ def checked_answer(answer: object, expected: type[A], plugin: str, method: str) 
     if isinstance(outcome, bool) or not isinstance(outcome, numbers.Integral):
         problem = f"an outcome of type {type(outcome).__name__}, not an integer"
     elif not 0 <= int(outcome) <= MAX_OUTCOME:
-        problem = f"an outcome that is not within 0 and {MAX_OUTCOME}"  # may have too many digits to be printed
+        problem = f"an outcome outside of 0..{MAX_OUTCOME}"  # may have too many digits to be printed
     elif not isinstance(message, str):
         problem = f"a message of type {type(message).__name__}, not str"
     if problem:

@@ -101,10 +101,10 @@ class RecoveryExecution:
         return result
 
     def _ended_early(self, message: str = "") -> RecoveryResult:
-        name, tail = self._run.plugin.name, f"; it said: {message}" if message else ""
+        name, tail = self._run.plugin.name, f"; last message: {message}" if message else ""
         if self._run.canceled:
             return RecoveryResult(RecoveryOutcome.CANCELED, f"recovery {name!r} canceled{tail}")
-        text = self._run.waited or f"recovery {name!r} took over {self._run.patience:g} s{tail}"
+        text = self._run.waited or f"recovery {name!r} took longer than {self._run.patience:g} s{tail}"
         return RecoveryResult(RecoveryOutcome.PAT_EXCEEDED, text)
 
     def _call(self) -> RecoveryResult:

@@ -174,7 +174,7 @@ class TransformBuffer:
         request = _Request(target, source, time, callback)
         with self._lock:
             if len(self._requests) >= MAX_PENDING_REQUESTS:
-                raise RuntimeError(f"{MAX_PENDING_REQUESTS} transform requests wait already")
+                raise RuntimeError(f"{MAX_PENDING_REQUESTS} transform requests are pending already")
             self._requests.append(request)
             answered = self._take_answered_requests()
         for found, answer in answered:

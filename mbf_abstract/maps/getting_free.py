@@ -28,7 +28,7 @@ WORTH_NAMING = 0.3
 def getting_free(navigation_map: NavigationMap, pose: Pose) -> str:
     """Name the motions that take the robot from ``pose``, in the frame of the map, to where it touches nothing."""
     ways = _ways(navigation_map, pose, MOTIONS) or _ways(navigation_map, pose, SIDEWAYS)
-    return f"it gets away by {' or '.join(ways)}" if ways else "no motion straight on or on the spot gets it away"
+    return f"it gets away by {' or '.join(ways)}" if ways else "no straight motion and no turn on the spot gets it away"
 
 
 def _ways(navigation_map: NavigationMap, pose: Pose, motions: tuple[tuple[str, Twist, str], ...]) -> list[str]:

@@ -58,7 +58,7 @@ class LayeredMap(NavigationMap):
         listening = [layer for layer in self.layers.values() if layer.listens_to(scan.source)]
         if not listening:
             known = list(self.source_names)
-            raise ValueError(f"no layer listens to the source {scan.source!r}, known are {known}")
+            raise ValueError(f"no layer listens to the source {scan.source!r}; known: {known}")
         seen = scan.checked()
         if len(seen.ends) or not len(scan.ends):
             for layer in listening:

@@ -106,7 +106,7 @@ class ScanIntake:
     def _report_unknown(self, source: str) -> None:
         known = sorted({name for served in self._maps.values() for name in served.map.source_names})
         if known:  # maps without any source are meant to see nothing
-            self._report("take_scan", source, f"no layer listens to the source {source!r}, known are {known}")
+            self._report("take_scan", source, f"no layer listens to the source {source!r}; known: {known}")
 
     def _report_refused(self, name: str, source: str, error: TransformError | None) -> None:
         if error is None:

@@ -100,7 +100,7 @@ class BatchPlanner:
         ValueError
             Not as many starts as goals, or a tolerance is negative.
         TransformError
-            A pose can not be brought into the global frame.
+            A pose cannot be transformed to the global frame.
         """
         if len(starts) != len(goals):
             raise ValueError(f"as many starts as goals are needed, got {len(starts)} and {len(goals)}")

@@ -227,7 +227,7 @@ class MapServer(AbstractNavigationServer):
         found = [place for place in places if layer in (place, places[place][1])]
         if len(found) != 1:
             problem = f"there is no layer {layer!r}" if not found else f"several maps have a layer {layer!r}"
-            raise ServerError(f"{problem}, known are {', '.join(places) or 'none'}")
+            raise ServerError(f"{problem}; known: {', '.join(places) or 'none'}")
         return places[found[0]]
 
 

@@ -45,7 +45,7 @@ class CancelToken:
                 return
         callback()
 
-    def cancel(self, reason: str = "cancelled by the client") -> bool:
+    def cancel(self, reason: str = "canceled by the client") -> bool:
         """Set the token; return whether this call was the one that set it."""
         with self._lock:
             if self.cancelled:

@@ -64,7 +64,7 @@ class LayerAnswers(SnapshotAnswers):
             inflates = any(hasattr(layer.parameters, "inflation_radius") for layer in self.layers.enabled)
             if self.layers and not inflates and self.inscribed_radius > 0.0:
                 radius = f"{self.inscribed_radius:.2f} m"
-                text = f"no inflation layer: grid planners take the robot, of inscribed radius {radius}, for a point"
+                text = f"no inflation layer: planners treat the robot, whose inscribed radius is {radius}, as a point"
                 warnings.append(text)
             return warnings
 
@@ -93,7 +93,7 @@ class LayerAnswers(SnapshotAnswers):
         of a floor plan where it is asked for. Raises KeyError where a name is no layer.
         """
         with self._lock:
-            for layer in self.layers.chosen(layer_names):
+            for layer in self.layers.forgetting(layer_names):
                 layer.reset()
             self._window.recompute_all()
             return [layer.name for layer in self._clearable(layer_names)]

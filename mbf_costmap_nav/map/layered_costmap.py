@@ -163,7 +163,7 @@ class LayeredCostmap(LayerAnswers):
             The pose is in another frame.
         """
         if robot_pose is not None and robot_pose.frame_id != self.frame_id:
-            raise ValueError(f"robot pose is in frame {robot_pose.frame_id!r}, the costmap in {self.frame_id!r}")
+            raise ValueError(f"the robot's pose is in {robot_pose.frame_id!r}, the costmap in {self.frame_id!r}")
         with self._lock:
             self.end_overrides(now)
             self._place_floors()

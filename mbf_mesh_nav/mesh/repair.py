@@ -207,7 +207,7 @@ class _Check:
         offsets, incident, across = self.neighbours(mesh)
         fans, counts = fans_at_vertices(mesh.faces, across, offsets, incident)
         several = counts > 1
-        text = "{count} vertices join groups of faces that touch in this point only"
+        text = "{count} vertices join groups of faces that touch at this point only"
         self.found("non_manifold_vertices", text, mesh.vertex_source[several], harmless=True)
         if not several.any() or "non_manifold_vertices" not in self.repair:
             return mesh

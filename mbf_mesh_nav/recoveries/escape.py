@@ -87,7 +87,7 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
             return RecoveryResult(RecoveryOutcome.FAILURE, text)
         snapshot = mesh_map.snapshot()
         if not snapshot.blocked(p.cost_limit)[mesh_map.faces[spot.face]].any():
-            return RecoveryResult(RecoveryOutcome.SUCCESS, "the robot stands on safe surface")
+            return RecoveryResult(RecoveryOutcome.SUCCESS, "the robot stands on a safe surface")
         own_patch = self._patch_below(spot, snapshot, flag)
         path = self._escape_path(spot, own_patch, request)
 
@@ -100,7 +100,7 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
                     here = mesh_map.locate_one(pose.position, SURFACE_DISTANCE)
                     path = None if here is None else self._escape_path(here, own_patch, request)
             if path is None:
-                message = f"no safe surface within {p.max_distance:g} m over the surface"
+                message = f"no safe surface within {p.max_distance:g} m along the surface"
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, message)
             return self._drive(pose, path.tracker)
 
@@ -115,7 +115,7 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
         p = self.parameters
         x, y, z = tracker.points[-1].tolist()
         if ground_distance(pose, Pose((x, y, z), frame_id=pose.frame_id)) <= p.reach:
-            return RecoveryResult(RecoveryOutcome.SUCCESS, f"reached safe surface after {tracker.length:.2f} m")
+            return RecoveryResult(RecoveryOutcome.SUCCESS, f"reached a safe surface after {tracker.length:.2f} m")
         bearing, curvature = arc_to(pose, tracker.point_at(tracker.progress + 0.3))
         if abs(bearing) > 0.6:
             return Twist.planar(wz=math.copysign(p.yaw_rate, bearing))

@@ -172,7 +172,7 @@ def test_a_goal_whose_driver_hangs_from_an_earlier_one_says_so(drive_into):
     handle.wait()
     again = site.session.navigator.send(ExePathGoal(site.session.path_to(60.0))).wait()
     assert again.outcome == ExePathOutcome.PAT_EXCEEDED
-    assert "the robot's send_command() has not come back from an earlier command" in again.message
+    assert "the robot's send_command() has not returned from an earlier command" in again.message
 
 
 def test_a_server_closes_although_its_driver_blocks(drive_into):

@@ -82,7 +82,7 @@ class RoomToTurn:
             return None, reason
         others = [*along(), *others]
         if others and self._driven >= distance:
-            return None, f"{reason}; {self._driven:.2f} m of driving on made no room to turn"
+            return None, f"{reason}; after {self._driven:.2f} m of driving on there is still no room to turn"
         motion = next((motion for motion in others if not blocked(motion)), None)
         if motion is None:
             return None, reason

@@ -49,7 +49,7 @@ class SourceWatch:
             return f"observation source {self.name!r} has not sent anything yet"
         age = now - self._last
         if age < -MAX_STAMP_LEAD:
-            return f"observation source {self.name!r} has a stamp {-age:.2f} s in the future, is its clock right?"
+            return f"observation source {self.name!r} is stamped {-age:.2f} s in the future; check its clock"
         if age > limit:
             return f"observation source {self.name!r} is silent for {age:.2f} s, expected every {limit:.2f} s"
         return "" if self._in_map else f"nothing of observation source {self.name!r} is in the map since it was cleared"

@@ -63,7 +63,7 @@ def refuse_units(files: Sequence[Path], parts: Sequence[FloatArray], is_stated: 
         text = (
             f"{files[longest].name} is {extents[longest]:.6g} m long, {files[shortest].name} {extents[shortest]:.6g} m"
         )
-        raise MeshError("point cloud", [f"the files have hardly the same unit: {text}"])
+        raise MeshError("point cloud", [f"the files probably have different units: {text}"])
     _refuse_far_apart(files, parts)
     lower = np.min([part.min(axis=0) for part in parts], axis=0)
     upper = np.max([part.max(axis=0) for part in parts], axis=0)
@@ -76,7 +76,7 @@ def refuse_units(files: Sequence[Path], parts: Sequence[FloatArray], is_stated: 
     if is_degrees(lower, upper) and height > 10.0 * length:
         raise MeshError(str(files[0]), [f"x and y look like degrees ({size}); project them to metres first"])
     if not is_stated and length > LONGEST:
-        text = f"in metres it is {size}: its unit is hardly the metre"
+        text = f"in metres it is {size}: its unit is probably not the metre"
         raise MeshError(str(files[0]), [text], "Give the unit, e.g. --scale 0.001 for millimetres")
     if length < SHORTEST:
         hint = "" if is_stated else "If its unit is not the metre, give it with --scale"
@@ -95,7 +95,7 @@ def _refuse_far_apart(files: Sequence[Path], parts: Sequence[FloatArray]) -> Non
         nearest = int(np.argmin(gaps))
         if gaps[nearest] > LONGEST:
             text = f"{file.name} lies {gaps[nearest]:.6g} m from {files[nearest].name}, expected at most {LONGEST:g} m"
-            hint = "They have hardly the same coordinate system or unit"
+            hint = "They probably differ in coordinate system or unit"
             raise MeshError("point cloud", [text], hint)
 
 

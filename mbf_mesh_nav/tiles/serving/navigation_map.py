@@ -134,7 +134,7 @@ class TiledNavigationMap(TileQuestions):
         built, radius = self.tiled.index.inscribed_radius, self.inscribed_radius
         if not 0.0 < built < radius:
             return []
-        text = f"the tiles were built for a robot of the radius {built:g} m, this one has {radius:g} m: beside their"
+        text = f"the tiles were built for a robot with a radius of {built:g} m, this one has {radius:g} m: beside their"
         return [f"{text} obstacles, ground that its body touches may count as free; build them for this robot"]
 
     def moment(self) -> Moment:

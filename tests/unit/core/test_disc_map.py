@@ -97,4 +97,4 @@ def test_a_robot_at_a_wall_gets_away_by_what_leads_from_it():
 
 
 def test_inside_of_an_obstacle_nothing_is_promised():
-    assert getting_free(HalfPlane(), Pose.planar(3.0, 0.0)) == "no motion straight on or on the spot gets it away"
+    assert getting_free(HalfPlane(), Pose.planar(3.0, 0.0)) == "no straight motion and no turn on the spot gets it away"

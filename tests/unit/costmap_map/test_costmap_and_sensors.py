@@ -50,7 +50,7 @@ def test_a_stamp_from_the_future_is_reported_and_does_not_cover_silence(build, l
     see(1e6, 10.1)
     for now in (10.1, 50.0, 1000.0):
         costmap.update(None, now)
-        assert "'laser' has a stamp" in costmap.stale_reason(now)
+        assert "'laser' is stamped" in costmap.stale_reason(now)
     see(1000.0, 1000.0)
     assert not costmap.stale_reason(1000.0), "the source is right again"
     costmap.update(None, 1002.0)
@@ -97,7 +97,7 @@ def test_a_cleared_map_is_not_current_before_it_sees_again(build, layer, clear):
 
 def test_an_unknown_source_is_refused_with_the_known_ones(build, seeing):
     costmap = build("obstacle", obstacle=seeing)
-    with pytest.raises(ValueError, match=r"'lidar', known are \['laser'\]"):
+    with pytest.raises(ValueError, match=r"'lidar'; known: \['laser'\]"):
         costmap.insert_points("lidar", [(1.0, 1.0, 0.0)], (0.0, 0.0, 0.0), 0.0)
 
 

@@ -171,7 +171,7 @@ def test_a_map_nearly_all_occupied_is_reported(free, reported):
 
 def test_a_robot_on_a_map_without_inflation_is_reported_and_a_point_is_not(build):
     (warning,) = build("static", robot_radius=0.5).configuration_warnings()
-    assert warning == "no inflation layer: grid planners take the robot, of inscribed radius 0.49 m, for a point"
+    assert warning == "no inflation layer: planners treat the robot, whose inscribed radius is 0.49 m, as a point"
     assert build("static", "inflation", robot_radius=0.5).configuration_warnings() == []
     assert build("static").configuration_warnings() == build(robot_radius=0.5).configuration_warnings() == []
 

@@ -133,7 +133,7 @@ def test_a_source_that_no_map_knows_is_reported_once_whatever_its_frame(site):
     server, _, reported = site
     for _ in range(3):
         server.take_scan(ahead(0.0, frame="nowhere", source="lidra"))
-    assert reported() == ["no layer listens to the source 'lidra', known are ['lidar']"]
+    assert reported() == ["no layer listens to the source 'lidra'; known: ['lidar']"]
 
 
 def test_the_number_of_reported_names_is_bounded(site):

@@ -99,7 +99,7 @@ def test_no_motion_is_begun_while_an_earlier_command_has_not_come_back(scene):
     lease.revoke("hangs")
     other = scene.gate.acquire("b")
     assert not other.send(Twist.planar(0.9))
-    assert other.problem == "the robot's send_command() has not come back from an earlier command"
+    assert other.problem == "the robot's send_command() has not returned from an earlier command"
     scene.robot.free()
     scene.clock.sleep(0.1)
     assert other.send(Twist.planar(0.9))

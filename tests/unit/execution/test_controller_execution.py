@@ -118,7 +118,7 @@ def test_f285_a_failure_after_patience_is_patience_exceeded(make_session, states
     result = session.navigator.exe_path(session.path_to(5.0))
     assert end_state(states, session) == "pat_exceeded"
     assert result.outcome == Outcome.PAT_EXCEEDED
-    assert result.message == "no valid command for 1 s; the controller said: a chair"
+    assert result.message == "no valid command for 1 s; last message of the controller: a chair"
     assert (result.plugin_outcome, result.plugin_message) == (Outcome.BLOCKED_PATH, "a chair")
 
 
@@ -361,7 +361,7 @@ def test_a_robot_that_moves_without_getting_anywhere_oscillates(make_session, st
     session.controller.play(*[drive(0.3 if i // 10 % 2 else -0.3) for i in range(400)])
     result = session.navigator.exe_path(session.path_to(30.0))
     assert result.outcome == Outcome.OSCILLATION
-    assert "has not moved 0.5 m nor turned 3.14 rad in 3 s" in result.message
+    assert "has neither moved 0.5 m nor turned 3.14 rad in 3 s" in result.message
     assert end_state(states, session) == "oscillating"
 
 

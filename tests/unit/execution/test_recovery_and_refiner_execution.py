@@ -72,7 +72,7 @@ def test_a_behaviour_that_outlasts_its_patience_ends_with_pat_exceeded(make_sess
     handle = session.navigator.send(RecoveryGoal())
     result = handle.wait()
     assert (handle.status, result.outcome) == (GoalStatus.ABORTED, RecoveryOutcome.PAT_EXCEEDED)
-    assert "over 2 s; it said: ended" in result.message
+    assert "longer than 2 s; last message: ended" in result.message
     assert session.clock.now() == pytest.approx(2.0, abs=0.01)
 
 

@@ -235,7 +235,7 @@ def test_coordinates_that_four_bytes_cannot_hold_are_refused(tmp_path):
     ("points", "text"),
     [
         (POINTS[:1], "there is a single point in it, of which no map can be made"),
-        (POINTS * 1e4, "its unit is hardly the metre. Give the unit, e.g. --scale 0.001 for millimetres"),
+        (POINTS * 1e4, "its unit is probably not the metre. Give the unit, e.g. --scale 0.001 for millimetres"),
         (POINTS * [0.0, 0.0, 1.0], "all of its points lie at one place in the plan view"),
         (POINTS * 0.001, "too small for a map. If its unit is not the metre, give it with --scale"),
         (POINTS * [1e-5, 1e-5, 10.0] + [8.05, 52.27, 60.0], "x and y look like degrees"),

@@ -66,7 +66,7 @@ def test_a_source_that_no_layer_listens_to_is_reported_once_and_marks_nothing(ma
     for _ in range(3):
         server.take_scan(scan(source="lidra", frame="nowhere"))
     server.queries.update_map()
-    assert reported() == ["no layer listens to the source 'lidra', known are ['lidar']"]
+    assert reported() == ["no layer listens to the source 'lidra'; known: ['lidar']"]
     assert not server.mesh_map.snapshot().lethal.any()
 
 

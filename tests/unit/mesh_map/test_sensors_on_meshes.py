@@ -89,7 +89,7 @@ def test_a_silent_sensor_is_noticed_while_another_speaks():
 
 def test_a_layer_listens_to_its_own_sensors_only_and_waits_for_each():
     mesh = floor_map(sources=("front", "rear"))
-    with pytest.raises(ValueError, match=r"'ceiling', known are \['front', 'rear'\]"):
+    with pytest.raises(ValueError, match=r"'ceiling'; known: \['front', 'rear'\]"):
         see(mesh, post(1.0, 1.0), 1.0, source="ceiling")
     assert not mesh.snapshot().lethal.any()
     see(mesh, post(1.0, 1.0), 1.0, source="front")

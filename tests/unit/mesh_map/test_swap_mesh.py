@@ -137,7 +137,7 @@ def test_layer_parameters_change_at_run_time_and_are_an_event(navigator):
 @pytest.mark.parametrize(
     ("layer", "changes", "error", "text"),
     [
-        ("slope", {"threshold": 0.4}, ServerError, "no layer 'slope', known are mesh_map.slopes"),
+        ("slope", {"threshold": 0.4}, ServerError, "no layer 'slope'; known: mesh_map.slopes"),
         ("slopes", {"threshold": "steep"}, ValueError, "threshold"),
         ("slopes", {"angle": 0.4}, ValueError, "angle"),
     ],
