@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +17,13 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, normalize_angle
 from mbf_abstract.geometry.arithmetic import plane_rotation, rotated_back
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.maps.controllers.failures import no_path, outside_map
+from mbf_abstract.maps.controllers.failures import collision, missed_path, no_path, outside_map
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.grid.motion_check import first_refused
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.plugins import CostmapContext, CostmapController
 
@@ -52,6 +54,8 @@ class ControlCycle:
         Largest speed [m/s] the maps allow here.
     limit_factor : float
         At least 1: how much wider the controller's own limits are while a recovery relaxes them.
+    touches : bool
+        Whether the footprint touches an obstacle where the robot stands; then it may only move out of it.
     """
 
     request: ControlRequest
@@ -61,10 +65,20 @@ class ControlCycle:
     goal_tolerance: float
     speed_limit: float
     limit_factor: float = 1.0
+    touches: bool = False
+
+    def first_collision(self, poses: FloatArray) -> int:
+        """Index of the first of poses (n, 3: x, y, yaw) that the robot must not come to, or -1."""
+        if self.touches:
+            return first_refused(self.costmap, self.footprint, self.request.pose, poses)
+        return self.footprint.first_collision(self.costmap, poses)
 
 
 class PathFollower(CostmapController):
     """Base of the controllers: keeps the plan, checks frame, map and collision once, decides on arrival."""
+
+    leaves_contacts: ClassVar[bool] = False
+    """Whether it checks by ``ControlCycle.first_collision`` where it drives; without it, it stands in a collision."""
 
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)
@@ -116,11 +130,16 @@ class PathFollower(CostmapController):
         footprint = self.checked_footprint()
         if self._footprint is None or self._footprint.footprint is not footprint:
             self._footprint = FootprintCheck(footprint, costmap.resolution)
-        if self._footprint.collides(costmap, pose.x, pose.y, pose.yaw):
-            text = f"the footprint at ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad) touches a lethal cell"
-            return ControlResult(ExePathOutcome.COLLISION, text)
+        touches = self._footprint.collides(costmap, pose.x, pose.y, pose.yaw)
+        if touches and not self.leaves_contacts:
+            return collision(f"it stays at ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad)")
         factor = self.relaxation.slack(self.clock.now()).controller_factor
-        return ControlCycle(request, tracker, costmap, self._footprint, self.goal_dist_tolerance, limit, factor)
+        parameters: Any = self.parameters
+        farthest = parameters.max_path_distance if hasattr(parameters, "max_path_distance") else math.inf
+        if missed := missed_path(tracker, farthest * factor):
+            return missed
+        tolerance = self.goal_dist_tolerance
+        return ControlCycle(request, tracker, costmap, self._footprint, tolerance, limit, factor, touches)
 
     def _on_costmap(self, request: ControlRequest, tracker: PathTracker) -> tuple[ControlRequest, PathTracker, float]:
         """Update the progress; return request and plan in the costmap's frame, and the speed limit [m/s] there."""

@@ -27,6 +27,8 @@ AHEAD = 2.0
 class SamplingFollower(PathFollower):
     """A controller whose ``sampled`` is one cycle of it."""
 
+    leaves_contacts = True
+
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)
         self._keeping = KeepingToPath(context)

@@ -61,6 +61,7 @@ def roll_out(
         (pose.x, pose.y),
         footprint_discs(cycle.footprint.footprint),
         turning_radius,
+        cycle.touches,
     )
 
 
@@ -118,7 +119,10 @@ def footprint_discs(footprint: Footprint) -> Float32Array:
 
 
 def is_free(cycle: ControlCycle, trajectory: Float32Array) -> bool:
-    """Whether the full footprint is free of lethal cells along a trajectory (3, steps) relative to the robot."""
+    """Whether the full footprint is free of lethal cells along a trajectory (3, steps) relative to the robot.
+
+    Where it touches some already, the trajectory must lead out, see ``ControlCycle.first_collision``.
+    """
     poses = np.ascontiguousarray(trajectory.T, dtype=np.float64)
     poses[:, :2] += (cycle.request.pose.x, cycle.request.pose.y)
-    return cycle.footprint.first_collision(cycle.costmap, poses) < 0
+    return cycle.first_collision(poses) < 0

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Twist
+from mbf_abstract.maps.controllers.failures import no_motion
 from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
 from mbf_abstract.maps.controllers.standing import StandingParameters
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
@@ -50,6 +51,7 @@ class DWAParameters(PluginParameters):
     vx_samples: int = parameter(15, "Samples of the forward speed.", ge=1, le=200)
     vy_samples: int = parameter(5, "Samples of the sideways speed.", ge=1, le=200)
     vtheta_samples: int = parameter(25, "Samples of the yaw rate.", ge=1, le=200)
+    max_path_distance: float = parameter(2.0, "A path farther away is missed.", unit="m", gt=0.0, le=100.0)
     footprint_check_time: float = parameter(1.0, "How far the full footprint is checked.", unit="s", ge=0.0, le=10.0)
     critics: CriticParameters = parameter(
         CriticParameters(path_align=6.0, path_follow=8.0, obstacle=3.0), "Weights of the trajectory critics."
@@ -120,7 +122,7 @@ class DWAController(SamplingFollower):
                 return ControlResult(ExePathOutcome.SUCCESS, "", command, hindered_by)
         pose = cycle.request.pose
         text = f"all {len(candidates)} velocities reachable at ({pose.x:.2f}, {pose.y:.2f}) lead into an obstacle"
-        return ControlResult(ExePathOutcome.NO_VALID_CMD, f"{text} within {p.sim_time:g} s")
+        return no_motion(self.costmap, pose, f"{text} within {p.sim_time:g} s")
 
     def _held(self, cycle: ControlCycle, candidate: FloatArray, steps: int) -> Float32Array:
         """Poses (3, steps) of a robot that takes up a velocity (3,) at once.

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Twist
+from mbf_abstract.maps.controllers.failures import no_motion
 from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
 from mbf_abstract.maps.controllers.standing import StandingParameters
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
@@ -85,6 +86,7 @@ class MPPIParameters(PluginParameters):
     )
     temperature: float = parameter(0.3, "Small = only the best samples count.", gt=0.0, le=100.0)
     gamma: float = parameter(0.015, "Cost of leaving the nominal sequence.", ge=0.0, le=10.0)
+    max_path_distance: float = parameter(2.0, "A path farther away is missed.", unit="m", gt=0.0, le=100.0)
     footprint_check_time: float = parameter(1.0, "How far the full footprint is checked.", unit="s", ge=0.0, le=10.0)
     critics: CriticParameters = parameter(CriticParameters(), "Weights of the trajectory critics.")
     moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
@@ -172,7 +174,7 @@ class MPPIController(SamplingFollower):
         if controls is None:
             place = f"({cycle.request.pose.x:.2f}, {cycle.request.pose.y:.2f})"
             text = f"none of {self.parameters.batch_size} trajectories sampled at {place} is free of collision"
-            return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
+            return no_motion(self.costmap, cycle.request.pose, text)
         if self._is_stuck(controls):
             left = cycle.tracker.remaining
             text = f"no feasible motion of the car makes progress, {left:.2f} m before the end of its path"

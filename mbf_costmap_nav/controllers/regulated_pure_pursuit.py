@@ -16,7 +16,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Path, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_poses
-from mbf_abstract.maps.controllers.failures import missed_path, obstacle_text
+from mbf_abstract.maps.controllers.failures import blocked_path, obstacle_text
 from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
@@ -34,12 +34,14 @@ from mbf_costmap_nav.control.regulated_speed import RegulatedFollower
 from mbf_costmap_nav.grid.costmap import FREE
 from mbf_costmap_nav.grid.footprint import Footprint
 
+LEADS_OUT = 0.3  # m; so far a robot that touches something looks whether the motion leads out
 SLOWEST = 0.01  # m/s; slower commands are looked ahead for as long as this one, to bound the work
 
 
 class RegulatedPurePursuitController(RegulatedFollower):
     """Carrot follower with regulated speed."""
 
+    leaves_contacts = True
     _at_goal = False
     _room_to_turn = RoomToTurn()
     _outline: tuple[Footprint, Footprint] | None = None
@@ -68,8 +70,6 @@ class RegulatedPurePursuitController(RegulatedFollower):
         cycle = self.begin_cycle(request)
         if isinstance(cycle, ControlResult):
             return cycle
-        if missed := missed_path(cycle.tracker, self.parameters.max_path_distance * cycle.limit_factor):
-            return missed
         return self._checked(cycle, self._motions(cycle))
 
     def _motions(self, cycle: ControlCycle) -> list[Twist]:
@@ -86,7 +86,7 @@ class RegulatedPurePursuitController(RegulatedFollower):
         """Motions that keep to the path, if the outline fits on it as far as the look-ahead at full speed."""
         backward, pose = self._backward(cycle), cycle.request.pose
         ahead = poses_ahead(cycle.tracker, self.look_ahead_distance(self.full_speed), backward)
-        if cycle.footprint.first_collision(cycle.costmap, ahead) >= 0:
+        if cycle.first_collision(ahead) >= 0:
             return []
         close = along_path(cycle.tracker, pose, backward)
         motions = [motion for motion in close if abs(motion.wz) * self.turning_radius <= abs(motion.vx)]
@@ -151,7 +151,7 @@ class RegulatedPurePursuitController(RegulatedFollower):
     # ----------------------------------------------------------------------------------------------- collisions
     def _checked(self, cycle: ControlCycle, motions: list[Twist]) -> ControlResult:
         """Take the first motion that is free within the distance for making room, else refuse."""
-        if not self.parameters.collision_check:
+        if not self.parameters.collision_check and not cycle.touches:
             return ControlResult(ExePathOutcome.SUCCESS, "", motions[0])
         pose, progress, distance = cycle.request.pose, cycle.tracker.progress, self.parameters.make_room_dist
         command, reason = self._room_to_turn.choose(
@@ -162,11 +162,15 @@ class RegulatedPurePursuitController(RegulatedFollower):
             lambda motion: self._blocked(cycle, motion),
             lambda: self._along_path(cycle),
         )
-        return ControlResult(ExePathOutcome.BLOCKED_PATH if reason else ExePathOutcome.SUCCESS, reason, command)
+        if reason:
+            return blocked_path(self.costmap, pose, reason)
+        return ControlResult(ExePathOutcome.SUCCESS, "", command)
 
     def _blocked(self, cycle: ControlCycle, command: Twist) -> str:
         """Where a command leads into an obstacle in the check time, not beyond the next cusp; empty if free."""
         duration, shortest = self.parameters.collision_check_time, self.parameters.min_distance_to_obstacle
+        if cycle.touches:
+            shortest = max(shortest, LEADS_OUT)
         if command.vx != 0.0:  # a robot that may creep as far as the check time allows ends up at the obstacle
             duration = max(duration, shortest / max(abs(command.vx), SLOWEST))
         duration /= cycle.limit_factor
@@ -180,7 +184,7 @@ class RegulatedPurePursuitController(RegulatedFollower):
         step = period / math.ceil(period * outline_speed / (0.5 * cycle.costmap.resolution) + 1e-9)
         pose = cycle.request.pose
         poses = arc_poses((pose.x, pose.y, pose.yaw), command.vx, 0.0, command.wz, max(duration, step), step)
-        hit = cycle.footprint.first_collision(cycle.costmap, poses)
+        hit = cycle.first_collision(poses)
         if hit < 0:
             return ""
         x, y = poses[hit, 0], poses[hit, 1]

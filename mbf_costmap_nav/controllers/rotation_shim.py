@@ -47,6 +47,7 @@ class RotationShimController(PathFollower):
 
     Parameters: ClassVar[type[PluginParameters]] = RotationShimParameters
     parameters: RotationShimParameters
+    leaves_contacts = True
     inner_plugins = (InnerPlugin(PluginKind.CONTROLLER, "inner_type", "inner"),)
 
     def __init__(self, context: CostmapContext) -> None:
@@ -115,4 +116,4 @@ class RotationShimController(PathFollower):
         """Whether turning for another half second would touch a lethal cell; then the inner controller takes over."""
         pose = cycle.request.pose
         poses = arc_poses((pose.x, pose.y, pose.yaw), 0.0, 0.0, command.wz, 0.5, 0.05)
-        return cycle.footprint.first_collision(cycle.costmap, poses) >= 0
+        return cycle.first_collision(poses) >= 0

@@ -21,6 +21,8 @@ COLLISION = 1.0e6
 _VALUES = np.concatenate([np.arange(INSCRIBED) / 252.0, np.full(UNKNOWN - INSCRIBED, COLLISION), [0.0]])
 VALUE_OF_COST = _VALUES.astype(np.float32)
 """(256,) what a cell adds: 0..1 by its cost, COLLISION from the inscribed one on, nothing if unknown."""
+WHILE_TOUCHING = np.minimum(VALUE_OF_COST, np.float32(1.0))
+"""The same for a robot that touches something already: no cell that it has to cross counts as a collision."""
 
 
 def obstacle(rollouts: Rollouts) -> Float32Array:
@@ -34,7 +36,7 @@ def obstacle(rollouts: Rollouts) -> Float32Array:
         rollouts.poses,
         rollouts.discs,
         STRIDE,
-        VALUE_OF_COST,
+        WHILE_TOUCHING if rollouts.touches else VALUE_OF_COST,
     )
     np.greater_equal(total, np.float32(COLLISION), out=rollouts.collided)
     return np.asarray(total / np.float32(rollouts.poses.shape[1] / STRIDE))

@@ -74,6 +74,8 @@ class Rollouts:
         Offsets [m] along the robot's x axis of the discs of its inscribed radius that stand for its footprint.
     turning_radius : float
         Radius of the tightest curve [m]; 0 = the robot turns on the spot.
+    touches : bool
+        Whether the robot touches an obstacle already; no trajectory counts as collided then, see ``is_free``.
     collided : (samples,) bool
         Set by the obstacle critic.
     """
@@ -92,6 +94,7 @@ class Rollouts:
     robot: tuple[float, float]
     discs: Float32Array
     turning_radius: float = 0.0
+    touches: bool = False
     collided: NDArray[np.bool_] = field(init=False)
     furthest: int = field(init=False)
 

@@ -22,7 +22,7 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.arithmetic import exp, norm
 from mbf_abstract.geometry.polyline import reverse_segments
 from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
-from mbf_abstract.maps.controllers.failures import missed_path
+from mbf_abstract.maps.controllers.failures import missed_path, no_motion
 from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
 from mbf_abstract.maps.tracking.avoidance import Encounters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
@@ -144,7 +144,7 @@ class MPPIController(SamplingFollower):
         p, off = self.parameters, heading_error(pose, approach.goal)
         self._idle_cycles += p.motion_model == "ackermann"
         if self._idle_cycles > _IDLE_CYCLES:
-            message = f"the goal is reached but for {off:.2f} rad, which a car cannot correct where it stands"
+            message = f"the goal is reached but for {off:.2f} rad of heading, which a car cannot correct there"
             return ControlResult(ExePathOutcome.NO_VALID_CMD, message)
         turn = clamp(2.0 * off, p.max_vel_theta)
         return ControlResult(ExePathOutcome.SUCCESS, "", self._motions.command(0.0, turn))
@@ -154,7 +154,7 @@ class MPPIController(SamplingFollower):
         motion = self._best_motion(spot, pose, around)
         if motion is None:
             text = f"no motion sampled at {position_text(spot.point)} is collision-free and makes progress"
-            return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
+            return no_motion(self.mesh_map, pose, text)
         self._nominal = np.concatenate([motion[1:], motion[-1:]])
         command = self._motions.command(float(motion[0, 0]), float(motion[0, 1]))
         return ControlResult(ExePathOutcome.SUCCESS, "", command, self._hindered_by)

@@ -17,18 +17,13 @@ import numpy as np
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to, in_robot_frame
 from mbf_abstract.geometry.tangent_plane import heading_error
-from mbf_abstract.maps.controllers.failures import missed_path, obstacle_text
+from mbf_abstract.maps.controllers.failures import blocked_path, missed_path
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
-from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter
-from mbf_mesh_nav.mesh.borders import beyond_border
-from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.motion.goal_approach import GoalApproach, braking_speed, clamp, tracker_on_surface
-from mbf_mesh_nav.motion.surface_follower import SurfaceFollower
-
-OBSTACLE_STEP = 0.1  # m between two looks along the path
+from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, SurfaceFollower
 
 
 class PathFollowerParameters(PluginParameters):
@@ -102,28 +97,15 @@ class PathFollower(SurfaceFollower):
             turn = self.parameters.turn_gain * heading_error(pose, approach.goal)
             return self._command(0.0, turn)
         if obstacle := self._obstacle_on_path(surface.point):
-            return ControlResult(ExePathOutcome.BLOCKED_PATH, obstacle)
+            return blocked_path(self.mesh_map, pose, obstacle)
         slope = math.acos(clamp(float(self.mesh_map.face_normals[surface.face, 2]), 1.0))
         return self._pursue(pose, slope)
 
     def _obstacle_on_path(self, here: FloatArray) -> str:
-        """The first place on the path that the map forbids now, as a text; empty without one in reach.
-
-        A robot that stands on forbidden surface may leave it, see ``kernels.search.forbidden_surface``. Where the path
-        leads off the surface it is blocked too.
-        """
+        """The first place on the path that the map forbids now, as a text; empty without one in reach."""
         ahead = np.arange(0.0, self.parameters.obstacle_distance / self.limit_factor, OBSTACLE_STEP)
         places = np.concatenate([here[None], self._tracker.points_at(self._tracker.progress + ahead)])
-        location = self.mesh_map.locate(places, self.parameters.max_surface_distance)
-        corners = self.mesh_map.faces[location.faces]
-        ranks = self.mesh_map.snapshot().traversability_rank(self.parameters.cost_limit, corners)
-        nearest = np.take_along_axis(ranks, np.argmax(location.barycentric, axis=1)[:, None], axis=1)[:, 0]
-        mixed = np.where(nearest > 0.0, (ranks * location.barycentric).sum(axis=1), 0.0)
-        mixed[(location.faces < 0) | beyond_border(self.mesh_map.topology, places, location)] = LETHAL_RANK
-        for place, before, now in zip(places[1:], mixed[:-1], mixed[1:], strict=True):
-            if not may_enter(before, now):
-                return obstacle_text(position_text(place))
-        return ""
+        return self.obstacle_along(places, self.parameters.max_surface_distance, self.parameters.cost_limit)
 
     def _pursue(self, pose: Pose, slope: float) -> ControlResult:
         """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""

@@ -5,7 +5,8 @@ long narrow robot (the inscribed radius is a circle; use ``tilt`` or a footprint
 Rule of mesh_navigation: ``lethal_value`` at the lethal vertices, ``inscribed_value`` up to the inscribed radius, then
 ``inscribed_value * exp(-cost_scaling_factor (d - inscribed_radius))`` up to the inflation radius, 0 beyond. Deviations:
 isolated lethal vertices are inflated too, with ``source_cost`` also vertices that are not lethal, and a change of the
-input repairs the distances instead of starting over. The repulsive vectors are not offered; our planners do not steer
+input repairs the distances instead of starting over, and ``inscribed_value`` is 1 by default instead of 0.99: planners
+would pass where the robot touches. The repulsive vectors are not offered; our planners do not steer
 by them.
 Cost: linear in the vertices within the radius; an update in the vertices whose distance changes.
 """
@@ -32,7 +33,9 @@ class InflationParameters(LayerParameters, InflationRadii):
     inscribed_radius: float = parameter(0.25, "Radius of the robot's inner circle.", unit="m", gt=0.0)
     inflation_radius: float = parameter(0.4, "Distance at which the cost ends.", unit="m", gt=0.0)
     lethal_value: float = parameter(1.0, "Cost of lethal vertices; .inf is the safe choice.", ge=0.0, allow_inf=True)
-    inscribed_value: float = parameter(0.99, "Cost up to the inscribed radius.", ge=0.0)
+    inscribed_value: float = parameter(
+        1.0, "Cost up to the inscribed radius; below the cost_limit of planners they pass there.", ge=0.0
+    )
     cost_scaling_factor: float = parameter(1.0, "Rate of the exponential fall-off.", unit="1/m", ge=0.0)
     source_cost: float = parameter(
         math.inf,

@@ -11,6 +11,7 @@ from mbf_mesh_nav.files.elevation_files import elevation_readers
 from mbf_mesh_nav.files.file_frames import FileFrame, file_frame
 from mbf_mesh_nav.files.map_header import read_map_header
 from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.snapshot_answers import FORBIDDEN_COST
 from mbf_mesh_nav.mesh.mesh_report import Finding
 
 LETHAL_SHARE = 0.95
@@ -60,8 +61,8 @@ def _narrow(mesh_map: MeshMap) -> Iterator[Finding]:
         return
     inflations = {name: one.parameters for name, one in layers.items() if hasattr(one.parameters, "inflation_radius")}
     if radius > 0.0 and not inflations:
-        text = "no layer is an inflation or a tilt: the planners treat the robot as a point, its inscribed radius is "
-        text += f"{radius:g} m"
+        text = f"planners treat the robot, whose inscribed radius is {radius:g} m, as a point"
+        text = f"no inflation or tilt layer: {text}"
         yield Finding("narrow", text, NOWHERE, harmless=True)
     for name, parameters in inflations.items():
         own = float(getattr(parameters, "inscribed_radius", radius))
@@ -69,6 +70,13 @@ def _narrow(mesh_map: MeshMap) -> Iterator[Finding]:
             text = (
                 f"inscribed_radius {own:g} m of layer '{name}' is less than the robot's (mesh_map.inscribed_radius), "
                 f"{radius:g} m, and no tilt layer looks at the whole robot: ground its body touches may count as free"
+            )
+            yield Finding("narrow", text, NOWHERE, harmless=True)
+        cost = float(getattr(parameters, "inscribed_value", FORBIDDEN_COST))
+        if cost < FORBIDDEN_COST:
+            text = (
+                f"inscribed_value {cost:g} of layer '{name}' is below {FORBIDDEN_COST:g}, the usual cost_limit of "
+                "planners: they pass where the robot's body touches an obstacle, and controllers stop there"
             )
             yield Finding("narrow", text, NOWHERE, harmless=True)
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Pose
-from mbf_abstract.maps.controllers.failures import no_path, outside_map
+from mbf_abstract.maps.controllers.failures import no_path, obstacle_text, outside_map
 from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath
 from mbf_abstract.plugins import ControlResult
+from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter
+from mbf_mesh_nav.mesh.borders import beyond_border
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.motion.goal_approach import GoalApproach
 from mbf_mesh_nav.plugins import MeshContext, MeshController
+
+OBSTACLE_STEP = 0.1  # m between two looks along a path
 
 
 class SurfaceFollower(MeshController):
@@ -29,6 +36,23 @@ class SurfaceFollower(MeshController):
         if spot is None:
             return outside_map(position_text(pose.position), f"no surface within {max_distance:g} m")
         return spot, self._approach
+
+    def obstacle_along(self, places: FloatArray, max_distance: float, cost_limit: float) -> str:
+        """The first of places (n, 3) [m] that the map forbids now, as a text; empty if the robot may go along all.
+
+        A robot that stands on forbidden surface, as the first place is, may leave it, see
+        ``kernels.search.forbidden_surface``. What lies farther than ``max_distance`` [m] from the surface, or past its
+        border, is forbidden too.
+        """
+        location = self.mesh_map.locate(places, max_distance)
+        ranks = self.mesh_map.snapshot().traversability_rank(cost_limit, self.mesh_map.faces[location.faces])
+        nearest = np.take_along_axis(ranks, np.argmax(location.barycentric, axis=1)[:, None], axis=1)[:, 0]
+        mixed = np.where(nearest > 0.0, (ranks * location.barycentric).sum(axis=1), 0.0)
+        mixed[(location.faces < 0) | beyond_border(self.mesh_map.topology, places, location)] = LETHAL_RANK
+        for place, before, now in zip(places[1:], mixed[:-1], mixed[1:], strict=True):
+            if not may_enter(before, now):
+                return obstacle_text(position_text(place))
+        return ""
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the path has been driven to its last pose, and that is reached."""

@@ -12,15 +12,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from mbf_abstract.commands.completion import complete_backend, complete_controller, complete_planner
-from mbf_abstract.commands.foxglove_options import (
-    AT,
-    FOXGLOVE,
-    ORIGIN,
-    READ_ONLY,
-    TOKEN,
-    foxglove_of,
-    refuse_without,
-)
+from mbf_abstract.commands.foxglove_options import AT, FOXGLOVE, ORIGIN, READ_ONLY, TOKEN, foxglove_of, refuse_without
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from terrain.commands.command_line import command_line
 from terrain.commands.compare import compare

@@ -163,7 +163,9 @@ global_costmap:
   layers:
     [{name: obstacles, type: obstacle}, {name: moving, type: moving_obstacles}, {name: inflation, type: inflation}]
   moving: {sources: [lidar]}
-  obstacles: {sources: {lidar: {obstacle_max_range: 4.5, raytrace_max_range: 5.0}}}
+  obstacles:
+    footprint_clearing_enabled: false
+    sources: {lidar: {obstacle_max_range: 4.5, raytrace_max_range: 5.0}}
   inflation: {inflation_radius: 0.5}
 local_costmap:
   rolling_window: true
@@ -175,7 +177,9 @@ local_costmap:
   layers:
     [{name: obstacles, type: obstacle}, {name: moving, type: moving_obstacles}, {name: inflation, type: inflation}]
   moving: {sources: [lidar]}
-  obstacles: {sources: {lidar: {obstacle_max_range: 4.5, raytrace_max_range: 5.0}}}
+  obstacles:
+    footprint_clearing_enabled: false
+    sources: {lidar: {obstacle_max_range: 4.5, raytrace_max_range: 5.0}}
   inflation: {inflation_radius: 0.5}
 """
 )

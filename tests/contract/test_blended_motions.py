@@ -20,7 +20,7 @@ HORIZON = 2.5  # s, until which what is met counts
 def crossing(ahead, aside, speed):
     """Who crosses the robot's way, and does not touch one that stays."""
     x, y = START.x + ahead, START.y - aside
-    return TrackedObject(1, Motion.MOVING, x, y, 0.0, 0.0, speed, RADIUS, 0.05, 0.1, 5.0, 0.0, 0.0, 0.0, "map")
+    return TrackedObject(1, Motion.MOVING, x, y, 0.0, 0.0, speed, RADIUS, 5.0, 0.0, 0.0, 0.0, "map")
 
 
 def least_gap(velocities, known, step):

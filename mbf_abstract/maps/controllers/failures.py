@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.navigation_map import NavigationMap
+from mbf_abstract.maps.queries import PADDED, CellState
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult
 
@@ -16,6 +18,34 @@ def obstacle_text(place: str) -> str:
 def no_path() -> ControlResult:
     """Failure of a controller that has been given no path."""
     return ControlResult(ExePathOutcome.INVALID_PATH, "no path has been set")
+
+
+def blocked_path(navigation_map: NavigationMap, pose: Pose, obstacle: str) -> ControlResult:
+    """Failure of a controller that stops at ``pose``, in the frame of the map, before an ``obstacle``.
+
+    A robot that touches something may move as long as it goes no deeper; where its path does, that is a COLLISION.
+    """
+    if touches(navigation_map, pose):
+        return collision(f"its path leads farther into it: {obstacle}")
+    return ControlResult(ExePathOutcome.BLOCKED_PATH, obstacle)
+
+
+def no_motion(navigation_map: NavigationMap, pose: Pose, reason: str) -> ControlResult:
+    """Failure of a controller at ``pose``, in the frame of the map, none of whose motions is free."""
+    if touches(navigation_map, pose):
+        return collision(f"no motion that was tried leads out of it: {reason}")
+    return ControlResult(ExePathOutcome.NO_VALID_CMD, reason)
+
+
+def touches(navigation_map: NavigationMap, pose: Pose) -> bool:
+    """Whether the padded outline of the robot touches something lethal at a pose in the frame of the map."""
+    answer = navigation_map.pose_check(PADDED)(pose)
+    return CellState.LETHAL in (answer.state, answer.known)
+
+
+def collision(reason: str) -> ControlResult:
+    """Failure of a controller whose robot touches an obstacle and cannot get away as it would like."""
+    return ControlResult(ExePathOutcome.COLLISION, f"the robot touches an obstacle where it stands, and {reason}")
 
 
 def missed_path(tracker: PathTracker, allowed: float) -> ControlResult | None:

@@ -17,7 +17,7 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.maps.controllers.failures import missed_path, no_path, outside_map
+from mbf_abstract.maps.controllers.failures import blocked_path, missed_path, no_path, outside_map
 from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
@@ -121,7 +121,9 @@ class FollowPath(MapPlugin, AbstractController):
             )
         except TransformError as error:
             return ControlResult(ExePathOutcome.TF_ERROR, str(error))
-        return ControlResult(ExePathOutcome.BLOCKED_PATH if obstacle else ExePathOutcome.SUCCESS, obstacle, command)
+        if obstacle:
+            return blocked_path(self.navigation_map, there, obstacle)
+        return ControlResult(ExePathOutcome.SUCCESS, "", command)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the path has been driven to its end, and the pose is within both tolerances of it."""

@@ -15,11 +15,19 @@ from mbf_abstract.time.cancel import CancelToken
 
 
 class MapRefiner(MapPlugin, AbstractRefiner):
-    """A refiner that works in the frame of its map, on paths that drive forward only: write ``refine``."""
+    """A refiner that works in the frame of its map: write ``refine``.
+
+    Attributes
+    ----------
+    forward_only : bool
+        Whether a path that drives backward somewhere is left as it is.
+    """
+
+    forward_only = True
 
     @abstractmethod
     def refine(self, path: Path, cancel_token: CancelToken) -> Path | RefineResult:
-        """Return a better path of at least two poses, or why there is none.
+        """Return a better path of at least two poses, also as a result with notes, or why there is none.
 
         Parameters
         ----------
@@ -33,7 +41,7 @@ class MapRefiner(MapPlugin, AbstractRefiner):
         """Refine the path in the frame of the map; without success the result has the path as it was given."""
         if len(path) < 2:
             return RefineResult(RefinePathOutcome.SUCCESS, "nothing to refine", path)
-        if PathTracker(path).reverse.any():
+        if self.forward_only and PathTracker(path).reverse.any():
             text = "the path drives backward somewhere and is left as it is"
             return RefineResult(RefinePathOutcome.SUCCESS, text, path)
         frame = self.navigation_map.frame_id
@@ -45,7 +53,9 @@ class MapRefiner(MapPlugin, AbstractRefiner):
         refined = self.refine(path if path.frame_id == frame else T_map_path.apply_to_path(path), cancel_token)
         if cancel_token.cancelled:
             return RefineResult(RefinePathOutcome.CANCELED, cancel_token.reason, path)
-        if isinstance(refined, RefineResult):
-            return replace(refined, path=path)
-        back = refined if path.frame_id == frame else T_map_path.inverse().apply_to_path(refined)
-        return RefineResult(RefinePathOutcome.SUCCESS, "", back)
+        result = refined if isinstance(refined, RefineResult) else RefineResult(RefinePathOutcome.SUCCESS, "", refined)
+        if not result.success or result.path is None:
+            return replace(result, path=path)
+        return (
+            result if path.frame_id == frame else replace(result, path=T_map_path.inverse().apply_to_path(result.path))
+        )

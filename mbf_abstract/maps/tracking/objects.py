@@ -37,8 +37,6 @@ class TrackedObject:
         Estimated velocity [m/s] along the axes of that frame; 0 unless it is moving.
     radius : float
         Half of its length [m] along the longer axis, as far as it has been seen.
-    position_deviation, velocity_deviation : float
-        Standard deviations of the estimates [m, m/s], along each axis.
     age : float
         Time since it was first seen [s].
     unseen : float
@@ -60,8 +58,6 @@ class TrackedObject:
     vx: float
     vy: float
     radius: float
-    position_deviation: float
-    velocity_deviation: float
     age: float
     unseen: float
     standing: float

@@ -225,8 +225,6 @@ class Tracker:
             vy=vy,
             pace=state[states_of.PACE] if moves else 0.0,
             radius=max(state[states_of.HALF_X], state[states_of.HALF_Y]),
-            position_deviation=math.sqrt(state[states_of.VAR_POSITION]),
-            velocity_deviation=math.sqrt(state[states_of.VAR_VELOCITY]),
             age=now - state[states_of.FIRST_SEEN],
             unseen=max(now - state[states_of.LAST_SEEN], 0.0),
             standing=0.0 if moves else stood,

@@ -25,6 +25,7 @@ from mbf_abstract.testing.conformance import (
     planning,
     recovering,
     sensing,
+    touching,
 )
 from mbf_abstract.testing.conformance.rig import BackendRig, MakeServer
 from mbf_abstract.testing.conformance.site import Situation
@@ -32,7 +33,17 @@ from mbf_abstract.testing.contract.report import ContractBroken
 
 __all__ = ["SITUATIONS", "BackendRig", "ContractBroken", "MakeServer", "Situation", "check_map_backend"]
 
-_PARTS: tuple[ModuleType, ...] = (planning, driving, canceling, sensing, freshness, asking, recovering, changing)
+_PARTS: tuple[ModuleType, ...] = (
+    planning,
+    driving,
+    touching,
+    canceling,
+    sensing,
+    freshness,
+    asking,
+    recovering,
+    changing,
+)
 
 SITUATIONS: dict[str, Situation] = {
     name: part for module in _PARTS for name, part in vars(module).items() if isinstance(part, Situation)

@@ -12,10 +12,10 @@ import numpy as np
 
 from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.polyline import polyline_lengths
-from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.maps.map_plugin import MapContext, MapPlugin
+from mbf_abstract.maps.map_plugin import MapContext
+from mbf_abstract.maps.refiners.map_refiner import MapRefiner
 from mbf_abstract.outcomes import RefinePathOutcome
-from mbf_abstract.plugins import AbstractRefiner, RefineResult
+from mbf_abstract.plugins import RefineResult
 from mbf_abstract.time.cancel import CancelToken
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.mesh.positions import position_text
@@ -32,8 +32,11 @@ MARGIN = 8.0
 """Of the map around a piece, in distances between vertices; without costs the shortest path lies within its box."""
 
 
-class PathRefiner(MapPlugin, AbstractRefiner):
+class PathRefiner(MapRefiner):
     """Makes a refiner on the part around each piece.
+
+    A path that drives backward somewhere is left as a whole, as on one mesh: its pieces that drive forward are not
+    looked at for themselves.
 
     Parameters
     ----------
@@ -44,17 +47,14 @@ class PathRefiner(MapPlugin, AbstractRefiner):
     def __init__(self, refiner_class: type[MeshRefiner], context: MapContext[TiledNavigationMap]) -> None:
         super().__init__(context)
         self._class, self._context, self._map = refiner_class, context, context.navigation_map
+        self.forward_only = issubclass(refiner_class, MapRefiner) and refiner_class.forward_only
 
-    def apply_refinement(self, path: Path, cancel_token: CancelToken) -> RefineResult:
+    def refine(self, path: Path, cancel_token: CancelToken) -> RefineResult:
         """Refine piece by piece; a damaged tile and poses too far apart are a MAP_ERROR."""
         try:
-            there = self.transforms.transform_path(path, self._map.frame_id)
-            result = self._by_pieces(there, cancel_token)
-            if not result.success or result.path is None:
-                return replace(result, path=path)
-            return replace(result, path=self.transforms.transform_path(result.path, path.frame_id))
-        except (TransformError, MeshError) as error:
-            return RefineResult(RefinePathOutcome.MAP_ERROR, str(error), path)
+            return self._by_pieces(path, cancel_token)
+        except MeshError as error:
+            return RefineResult(RefinePathOutcome.MAP_ERROR, str(error))
 
     def _by_pieces(self, rest: Path, cancel_token: CancelToken) -> RefineResult:
         moment, done, notes = self._map.moment(), rest[:0], dict[str, None]()

@@ -53,7 +53,7 @@ def test_in_a_hall_it_steps_aside(give_way):
 
 
 def tracked(x, y, vx=0.0, motion=Motion.WAITING):
-    return TrackedObject(1, motion, x, y, 0.0, vx, 0.0, 0.3, 0.05, 0.1, 5.0, 0.0, 3.0, 0.0, "map")
+    return TrackedObject(1, motion, x, y, 0.0, vx, 0.0, 0.3, 5.0, 0.0, 3.0, 0.0, "map")
 
 
 @pytest.mark.parametrize("aside", [-0.3, 0.3])

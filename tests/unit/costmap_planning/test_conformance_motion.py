@@ -59,6 +59,7 @@ def test_f153_from_a_collision_only_what_leads_deeper_is_refused(depth):
     pole, wall = points_at((0.5 - depth, 0.0)), points_at(*((0.5 - depth, 0.01 * i) for i in range(-60, 60)))
     for costmap in (pole, wall):
         assert ahead(costmap, (-0.5, 0.0), 1.0) == ""
+        assert "the robot would touch it at (0.0" in ahead(costmap, (0.5, 0.0), 1.0), "one cell counts one all along"
     behind = points_at((0.5 - depth, 0.0), *((0.55, 0.01 * i) for i in range(-10, 10)))
     assert "the robot would touch it at (0.0" in ahead(behind, (0.5, 0.0), 1.0)
 

@@ -177,7 +177,7 @@ def test_a_straight_path_is_driven_forward(make_plugin, controller_class):
 @pytest.mark.parametrize(("controller_class", "model"), [(DWAController, {}), (MPPIController, CAR)])
 def test_a_robot_that_lets_somebody_by_is_not_stuck_and_names_them(make_plugin, controller_class, model):
     controller = make_plugin(controller_class, FREE_MAP, min_vel_x=0.0, **model)
-    comes = TrackedObject(4, Motion.MOVING, 0.9, 0.0, 0.0, -0.4, 0.0, 0.25, 0.05, 0.1, 5.0, 0.0, 0.0, 0.0, "map")
+    comes = TrackedObject(4, Motion.MOVING, 0.9, 0.0, 0.0, -0.4, 0.0, 0.25, 5.0, 0.0, 0.0, 0.0, "map")
     controller.navigation_map.tracked_objects = lambda now: (comes,)
     controller.set_plan(straight())
     for _ in range(IDLE_CYCLES + 20):

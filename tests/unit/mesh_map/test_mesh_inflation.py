@@ -188,7 +188,7 @@ TILT = {"name": "tilt", "type": "tilt"}
         (
             [BORDER],
             None,
-            "no layer is an inflation or a tilt: the planners treat the robot as a point",
+            "no inflation or tilt layer: planners treat the robot, whose inscribed radius is 0.34 m, as a point",
         ),
         ([BORDER, INFLATION], 0.34, ""),
         ([BORDER, TILT, INFLATION], 0.2, ""),
@@ -204,6 +204,17 @@ def test_a_robot_wider_than_what_the_layers_keep_off_it_is_reported_unless_a_til
     reported = [str(found) for found in mesh_map.report.findings if found.name == "narrow"]
     assert len(reported) == bool(text)
     assert all(text in one for one in reported)
+
+
+@pytest.mark.parametrize(
+    ("block", "reported"), [({}, 0), ({"inscribed_value": 0.99}, 1), ({"inscribed_value": 1.5}, 0)]
+)
+def test_a_cost_that_lets_planners_pass_where_the_robot_touches_is_reported(block, reported):
+    vertices, faces = heightfield_mesh(np.zeros((11, 11)), 0.15, 0.15)
+    parameters = MeshMapParameters(inscribed_radius=0.25, layers=[BORDER, INFLATION])
+    findings = build_mesh_map(parameters, {"inflation": block}, vertices=vertices, faces=faces).report.findings
+    texts = [str(found) for found in findings if "inscribed_value 0.99 of layer 'inflation' is below 1" in str(found)]
+    assert len(texts) == reported
 
 
 @given(seed=st.integers(0, 10**6))

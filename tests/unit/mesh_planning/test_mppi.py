@@ -168,7 +168,7 @@ def test_a_wall_thinner_than_a_step_is_not_jumped_over(make_plugin, plain, paint
 
 def test_a_robot_that_lets_somebody_by_is_not_stuck_and_names_them(make_plugin, plain):
     controller = make_plugin(MPPIController, plain(), moving_objects={"weight": 200.0})
-    comes = TrackedObject(4, Motion.MOVING, 1.5, 3.0, 0.0, -0.2, 0.0, 0.25, 0.05, 0.1, 5.0, 0.0, 0.0, 0.0, "map")
+    comes = TrackedObject(4, Motion.MOVING, 1.5, 3.0, 0.0, -0.2, 0.0, 0.25, 5.0, 0.0, 0.0, 0.0, "map")
     controller.mesh_map.tracked_objects = lambda now: (comes,)
     controller.set_plan(straight_path())
     for _ in range(40):

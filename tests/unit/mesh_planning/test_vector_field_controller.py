@@ -45,6 +45,18 @@ def test_the_yaw_rate_is_proportional_and_limited_on_both_sides(ready, error):
     assert command.vx == pytest.approx(max(expected, 0.0), abs=0.03)
 
 
+@pytest.mark.parametrize(("x", "distance", "stops"), [(1.5, 1.0, False), (2.2, 1.0, True), (2.2, 0.0, False)])
+def test_it_stops_before_what_appeared_on_its_way_since_the_plan(make_plugin, plain, paint, x, distance, stops):
+    mesh_map = plain()
+    plan = make_plugin(CVPPlanner, mesh_map).make_plan(PlanRequest(Pose.planar(1, 3), Pose.planar(5, 3)))
+    controller = make_plugin(VectorFieldController, mesh_map, obstacle_distance=distance)
+    assert controller.set_plan(plan.path)
+    paint(mesh_map, lambda places: np.where(np.abs(places[:, 0] - 3.0) < 0.3, np.inf, 0.0))
+    result = controller.compute_velocity_commands(ControlRequest(Pose.planar(x, 3), Twist()))
+    assert (result.outcome == ExePathOutcome.BLOCKED_PATH) == stops and result.success != stops
+    assert not stops or "the robot would touch it at (2." in result.message
+
+
 def test_the_speed_fades_towards_the_goal(ready):
     controller = ready(arrival_fading=1.0)
     speeds = [command_at(controller, Pose.planar(x, 3)).vx for x in (3.5, 4.4, 4.7, 4.85)]

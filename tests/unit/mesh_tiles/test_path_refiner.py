@@ -100,6 +100,19 @@ def test_a_refined_path_keeps_away_from_what_sensors_have_seen(tiled_hills, whol
     assert lethal < check(pose(free.path.positions[8])).state
 
 
+def test_a_path_that_reverses_somewhere_is_left_as_a_whole_as_on_one_mesh(tiled, whole_hills, monkeypatch):
+    """Not only the pieces that reverse: those that drive forward are long enough to be pieces of their own."""
+    monkeypatch.setattr(path_refiner, "PIECE", 16.0)
+    path = long_plans(tiled, whole_hills, 3)[0]
+    back = path[-2:-20:-1]  # the end is driven once more, backward
+    positions = np.concatenate([path.positions, back.positions])
+    reversing = Path(positions, np.concatenate([path.orientations, back.orientations]), path.frame_id)
+    ours, exact = refined(tiled, reversing), refined(whole_hills.map, reversing)
+    assert ours.message == exact.message == "the path drives backward somewhere and is left as it is"
+    assert ours.outcome == exact.outcome == RefinePathOutcome.SUCCESS
+    assert ours.path is reversing and exact.path is reversing
+
+
 def test_the_contract_of_refiners_is_kept(tiled, whole_hills):
     pulling.Parameters = StringPullingRefiner.Parameters
     path = long_plans(tiled, whole_hills, 3)[0]

@@ -21,7 +21,7 @@ STEP, HERE = 0.05, Pose.planar(0.0, 0.0)
 
 
 def person(x, y, vx=0.0, vy=0.0, motion=Motion.MOVING, z=0.0):
-    return TrackedObject(1, motion, x, y, z, vx, vy, 0.25, 0.05, 0.1, 5.0, 0.0, 0.0, 0.0, "map")
+    return TrackedObject(1, motion, x, y, z, vx, vy, 0.25, 5.0, 0.0, 0.0, 0.0, "map")
 
 
 class Seeing:

@@ -15,7 +15,7 @@ STRAIGHT = Path.from_points([(0.1 * step, 0.0, 0.0) for step in range(81)])
 
 
 def known(number=1, x=4.0, y=0.0, vx=0.0, vy=0.0, motion=Motion.PARKED, z=0.0):
-    return TrackedObject(number, motion, x, y, z, vx, vy, 0.25, 0.05, 0.1, 5.0, 0.0, 0.0, 0.0, "map")
+    return TrackedObject(number, motion, x, y, z, vx, vy, 0.25, 5.0, 0.0, 0.0, 0.0, "map")
 
 
 def found(*objects, within_time=2.0, path=STRAIGHT):

@@ -85,7 +85,7 @@ def test_a_robot_with_a_mass_stands_before_any_contact(velocity, command, x, y, 
         decel_lim_x=LIMITS.driving,
         decel_lim_theta=LIMITS.turning,
     )
-    known = TrackedObject(1, Motion.MOVING, x, y, 0.0, vx, vy, 0.25, 0.05, 0.1, 5.0, 0.0, 0.0, 0.0, "map")
+    known = TrackedObject(1, Motion.MOVING, x, y, 0.0, vx, vy, 0.25, 5.0, 0.0, 0.0, 0.0, "map")
     share, _ = safe_share(CARRIER, Pose.planar(0.0, 0.0), velocity, command, [known], limits)
     if share == 0.0:
         return

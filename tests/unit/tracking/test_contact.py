@@ -24,7 +24,7 @@ AHEAD = Twist.planar(0.6)
 
 
 def moving(x, y, vx=0.0, vy=0.0, radius=0.25, motion=Motion.MOVING, z=0.0):
-    return TrackedObject(1, motion, x, y, z, vx, vy, radius, 0.05, 0.1, 5.0, 0.0, 0.0, 0.0, "map")
+    return TrackedObject(1, motion, x, y, z, vx, vy, radius, 5.0, 0.0, 0.0, 0.0, "map")
 
 
 def share_of(command, *objects, box=DISC, velocity=None, limits=LIMITS, pose=HERE):

@@ -206,7 +206,7 @@ def test_a_run_on_a_mesh_keeps_the_costs_it_was_planned_on(meadow):
 
 
 def test_what_the_robot_knows_of_things_that_move_is_shown_until_it_knows_of_none(office, tmp_path):
-    walks = TrackedObject(7, Motion.MOVING, 1.0, 2.0, 0.0, 0.0, 0.6, 0.25, 0.05, 0.1, 3.0, 0.0, 0.0, 0.0, "map")
+    walks = TrackedObject(7, Motion.MOVING, 1.0, 2.0, 0.0, 0.0, 0.6, 0.25, 3.0, 0.0, 0.0, 0.0, "map")
     stands = replace(walks, number=9, x=4.0, vy=0.0, motion=Motion.PARKED)
     office.objects.extend([RecordedObjects.of(0.4, [walks, stands]), RecordedObjects.of(1.4, [])])
     write_mcap(tmp_path / "objects.mcap", office)

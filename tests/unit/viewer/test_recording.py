@@ -180,7 +180,7 @@ def test_what_moves_by_itself_is_recorded_with_every_sample_and_comes_back(tmp_p
 
 
 def tracked(number, x, vx, motion=Motion.MOVING):
-    return TrackedObject(number, motion, x, 2.0, 0.0, vx, 0.0, 0.25, 0.05, 0.1, 3.0, 0.0, 0.0, 0.0, "map")
+    return TrackedObject(number, motion, x, 2.0, 0.0, vx, 0.0, 0.25, 3.0, 0.0, 0.0, 0.0, "map")
 
 
 def test_what_the_robot_knows_of_things_that_move_is_recorded_and_comes_back(tmp_path):

@@ -191,7 +191,7 @@ def test_people_doors_and_other_robots_move_through_the_replay(hill_recording, c
 
 
 def test_what_the_robot_knows_to_move_has_an_arrow_in_the_replay_and_what_stands_has_none(hill_recording, contents_of):
-    walks = TrackedObject(7, Motion.MOVING, 3.0, 2.0, 0.5, 0.0, 0.8, 0.25, 0.05, 0.1, 3.0, 0.0, 0.0, 0.0, "map")
+    walks = TrackedObject(7, Motion.MOVING, 3.0, 2.0, 0.5, 0.0, 0.8, 0.25, 3.0, 0.0, 0.0, 0.0, "map")
     stands = replace(walks, number=8, vy=0.0, motion=Motion.WAITING)
     known = [RecordedObjects.of(1.0, [walks, stands]), RecordedObjects.of(2.0, [stands]), RecordedObjects.of(3.0, [])]
 
@@ -207,7 +207,7 @@ def test_what_the_robot_knows_to_move_has_an_arrow_in_the_replay_and_what_stands
 
 
 def test_arrows_end_where_nobody_is_seen_any_more_however_long_the_run(hill_recording, contents_of):
-    walks = TrackedObject(7, Motion.MOVING, 3.0, 2.0, 0.5, 0.0, 0.8, 0.25, 0.05, 0.1, 3.0, 0.0, 0.0, 0.0, "map")
+    walks = TrackedObject(7, Motion.MOVING, 3.0, 2.0, 0.5, 0.0, 0.8, 0.25, 3.0, 0.0, 0.0, 0.0, "map")
     gone = 0.2 * MAX_FRAMES + 0.2  # an odd look
     known = [RecordedObjects.of(0.2 * index, [walks]) for index in range(MAX_FRAMES + 1)]
     known += [RecordedObjects.of(gone, []), RecordedObjects.of(gone + 60.0, [walks])]
