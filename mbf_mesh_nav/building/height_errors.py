@@ -1,9 +1,9 @@
 """How wrong the height of each vertex of a built map may be, as far as its points show.
 
-Two things make a height wrong. The noise of the points is what is left of it in the mean of a cell. And where points
-disagree by more than their noise, they have seen ground that the faces do not show: relief between the vertices, or a
-boulder that scans from wrong poses have put to several places, so that it is a low hill on the map. Their spread beyond
-the noise is how far the ground is from the faces there.
+Two things make a height wrong. The noise of the points is what is left of it in the mean of a cell; where grass stands,
+its blades are noise, too. And where points disagree by more than their noise, they have seen ground that the faces do
+not show: relief between the vertices, or a boulder that scans from wrong poses have put to several places, so that it
+is a low hill on the map. Their spread beyond the noise is how far the ground is from the faces there.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
 from mbf_mesh_nav.building.heights import MEDIAN_OF_ERRORS
+from mbf_mesh_nav.building.noise_by_place import medians_by_place
 from mbf_mesh_nav.building.surface_patches import SurfacePatches
 from mbf_mesh_nav.kernels.building.disagreement import INVERSES, PATCHES, POINTS, SQUARES, sums_around
 
@@ -25,8 +26,10 @@ def height_errors(
 ) -> FloatArray:
     """Standard errors (P,) [m] of the heights of patches, of the place that is a patch and those linked to it.
 
-    The variance of the noise is that of the median distance of all points, which boulders do not change. A cell takes
-    one degree of freedom of its points, less if its height was smoothed. The mean of a cell has the variance of a
+    The variance of the noise is that of the median distance of the points around, which boulders do not change. Where
+    heights were smoothed, i.e. where poses are wrong, it is that of all points: points next to each other are of
+    different scans then, and what would look like grass may be boulders put to several places. A cell takes one degree
+    of freedom of its points, less if its height was smoothed. The mean of a cell has the variance of a
     point over their number, on average over the place; where heights are smoothed, cells with few points lean on
     their neighbours, and the usual number counts. A place without a point, in a filled hole, has that of one point. To
     it comes the variance of the place beyond that of the noise, unless chance explains it: the variance of n
@@ -48,8 +51,8 @@ def height_errors(
     if not len(known):
         return np.zeros(len(patches.cells))
     counts = (patches.ends - patches.firsts)[used & ~patches.is_filled]
-    noise = float(np.median(known)) / MEDIAN_OF_ERRORS
-    noise *= np.sqrt(len(known) / max(len(known) - kept_error * len(counts), 1.0))
+    noise = np.full(len(used), np.median(known)) if kept_error < 1.0 else medians_by_place(patches, distances, used)
+    noise *= 1.0 / MEDIAN_OF_ERRORS * np.sqrt(len(known) / max(len(known) - kept_error * len(counts), 1.0))
     sums = sums_around(distances, patches.firsts, patches.ends, links, used)
     points, cells = np.maximum(sums[:, POINTS], 1.0), np.maximum(sums[:, PATCHES], 1.0)
     of_cell = np.where(sums[:, PATCHES] > 0.0, sums[:, INVERSES] / cells, 1.0)

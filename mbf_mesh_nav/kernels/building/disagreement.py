@@ -10,6 +10,8 @@ from mbf_mesh_nav.kernels.compiled import kernel
 
 SQUARES, POINTS, PATCHES, INVERSES = 0, 1, 2, 3
 """Columns of ``sums_around``."""
+BINS = 256
+"""Of a histogram of distances."""
 
 
 @kernel
@@ -50,3 +52,35 @@ def sums_around(
                 for column in range(4):
                     sums[patch, column] += own[other, column]
     return sums
+
+
+@kernel
+def distance_histograms(
+    distances: NDArray[np.float32],
+    firsts: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    used: BoolArray,
+    blocks: IntArray,
+    block_count: int,
+    width: float,
+) -> IntArray:
+    """Histograms (block_count, BINS) of the absolute distances of the points of used patches, by the patches' blocks.
+
+    Parameters
+    ----------
+    distances, firsts, ends, used
+        As in ``sums_around``.
+    blocks : (P,) int32
+        The block of each patch.
+    width : float
+        Of a bin [m]; the last one holds what is farther.
+    """
+    counts = np.zeros((block_count, BINS), dtype=np.int32)
+    for patch in range(firsts.shape[0]):
+        if not used[patch]:
+            continue
+        for position in range(firsts[patch], ends[patch]):
+            distance = abs(float(distances[position]))
+            if not np.isnan(distance):
+                counts[blocks[patch], int(min(distance / width, BINS - 1.0))] += 1
+    return counts
