@@ -41,6 +41,7 @@ from mbf_mesh_nav.building.map_build import write_map
 from mbf_mesh_nav.building.map_facts import map_facts
 from mbf_mesh_nav.building.surface import BuiltSurface, build_surface
 from mbf_mesh_nav.files.map_header import MapHeader
+from mbf_mesh_nav.files.vertex_errors import VertexErrors
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from terrain.experiments.evaluation.outdoor import FROM_CORNER, LEVELS, SIZE, generated
@@ -81,11 +82,11 @@ class World(NamedTuple):
 
 
 class BuiltMap(NamedTuple):
-    """A mesh, and the standard errors of the heights of its vertices [m]."""
+    """A mesh, and the standard errors of its heights."""
 
     vertices: FloatArray
     faces: IntArray
-    height_errors: FloatArray
+    errors: VertexErrors
 
 
 def scan_ground(ground: Heightfield, rng: np.random.Generator, grass_share: float) -> FloatArray:
@@ -151,8 +152,8 @@ def coarser(built: BuiltMap, rng: np.random.Generator) -> BuiltMap:
     """A quarter of the vertices, with wrong heights; the error is what the vertices of the built map show."""
     mesh = decimated_to(built.vertices, built.faces, COARSE_SHARE)
     points = mesh.vertices + [0.0, 0.0, 1.0] * rng.uniform(-COARSE_HEIGHTS, COARSE_HEIGHTS, (len(mesh.vertices), 1))
-    errors = carried_errors(replace(mesh, vertices=points), built.vertices, built.height_errors)
-    return BuiltMap(points, mesh.faces, errors)
+    moved = replace(mesh, vertices=points)
+    return BuiltMap(points, mesh.faces, carried_errors(moved, built.vertices, built.faces, built.errors))
 
 
 def terrain_row(level: int, seed: int, folder: Path, kinds: Sequence[str] = KINDS[:2]) -> tuple[Scenario, Row]:
@@ -172,7 +173,8 @@ def terrain_row(level: int, seed: int, folder: Path, kinds: Sequence[str] = KIND
     centres = truth[0][truth[1]].mean(axis=1)[:, :2]
     near = np.linalg.norm(centres[:, None] - places[None], axis=2).min(axis=1) < 0.3
     built = built_map(surface)
-    meshes = {"true": BuiltMap(truth[0], truth[1][~near], np.zeros(len(truth[0]))), "built": built}
+    exact = np.zeros(len(truth[0]))
+    meshes = {"true": BuiltMap(truth[0], truth[1][~near], VertexErrors(exact, exact)), "built": built}
     if "posed" in kinds:
         scans = misplaced(points, rng)
         meshes["posed"] = built_map(build_surface(scans))
@@ -234,7 +236,7 @@ def building_row(number: int, folder: Path) -> tuple[Scenario, Row]:
 
 def built_map(surface: BuiltSurface) -> BuiltMap:
     """The map of a surface, with the errors that ``mbf map build`` writes."""
-    return BuiltMap(surface.vertices, surface.faces, surface.height_errors)
+    return BuiltMap(surface.vertices, surface.faces, VertexErrors(surface.height_errors, surface.place_errors))
 
 
 def write_maps(folder: Path, name: str, maps: Mapping[str, BuiltMap]) -> dict[str, str]:
@@ -242,8 +244,8 @@ def write_maps(folder: Path, name: str, maps: Mapping[str, BuiltMap]) -> dict[st
     files = {}
     for kind, built in maps.items():
         files[kind] = str(folder / f"{name}_{kind}.ply")
-        header = MapHeader((0.0, 0.0, 0.0), 0.0, 0.0, root_mean_square(built.height_errors))
-        write_map(Path(files[kind]), built.vertices, built.faces, header, built.height_errors)
+        header = MapHeader((0.0, 0.0, 0.0), 0.0, 0.0, root_mean_square(built.errors.of_vertices))
+        write_map(Path(files[kind]), built.vertices, built.faces, header, built.errors)
     return files
 
 

@@ -14,7 +14,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
-from mbf_mesh_nav.building.height_errors import root_mean_square
+from mbf_mesh_nav.files.vertex_errors import VertexErrors
 from mbf_mesh_nav.kernels.mesh.topology import unit_face_normals
 from mbf_mesh_nav.mesh.locate import SurfaceLocator
 from mbf_mesh_nav.mesh.mesh_report import MeshError
@@ -86,22 +86,35 @@ def decimated_to(vertices: FloatArray, faces: IntArray, share: float) -> Decimat
     return coarse
 
 
-def carried_errors(mesh: DecimatedMesh, vertices: FloatArray, errors: FloatArray) -> FloatArray:
-    """Standard errors (V,) [m] of a decimated mesh, of the heights of the vertices (n, 3) of the whole one (n,).
+def carried_errors(mesh: DecimatedMesh, vertices: FloatArray, faces: IntArray, errors: VertexErrors) -> VertexErrors:
+    """Standard errors of a decimated mesh, of those of the vertices (n, 3) and faces (m, 3) of the whole one.
 
     A vertex has the mean square of what lies on the faces around it, by the weights of the places there: the error of
-    the whole surface, and its distance from the faces.
+    the whole surface, and its distance from the faces. Those of places are taken at the middles of the whole one's
+    edges: what its vertices have of noise and the fewer faces have not is half as large there, as everywhere between
+    the vertices.
     """
     if mesh.error_max == 0.0:
         return errors
+    starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    squares = errors.of_places * errors.of_places
+    middles = 0.5 * (vertices[starts] + vertices[ends])
+    return VertexErrors(
+        _carried(mesh, vertices, errors.of_vertices * errors.of_vertices),
+        _carried(mesh, middles, 0.5 * (squares[starts] + squares[ends])),
+    )
+
+
+def _carried(mesh: DecimatedMesh, places: FloatArray, squares: FloatArray) -> FloatArray:
+    """Roots (V,) [m] of the mean squares around the vertices, of those of places (n, 3) of the whole surface [m2]."""
     topology = build_topology(checked_mesh(mesh.vertices, mesh.faces, ALLOWED)[0])
-    found = SurfaceLocator(topology).locate(vertices)
+    found = SurfaceLocator(topology).locate(places)
     corners = topology.internal_to_input[topology.faces[found.faces]].ravel()
-    squares = errors * errors + found.distances * found.distances
+    squares = squares + found.distances * found.distances
     count, weights = len(mesh.vertices), found.barycentric
     sums = np.bincount(corners, (weights * squares[:, None]).ravel(), count)
     totals = np.bincount(corners, weights.ravel(), count)
-    usual = root_mean_square(errors) ** 2 + mesh.error_rms * mesh.error_rms  # of a corner that no place is near to
+    usual = squares.mean()  # of a corner that no place is near to
     return np.asarray(np.sqrt(np.where(totals > 0.0, sums / np.maximum(totals, 1e-300), usual)))
 
 

@@ -69,6 +69,28 @@ class HeightLimits(NamedTuple):
         return self._replace(noise=noise, thickness=thickness, step=step)
 
 
+class KeptNoise(NamedTuple):
+    """Shares of the variance of the noise of a cell's mean that a surface has.
+
+    Attributes
+    ----------
+    at_vertices, between : float
+        Of the height of a vertex, and of a place on a face, averaged over all places.
+    """
+
+    at_vertices: float
+    between: float
+
+    @property
+    def is_less(self) -> bool:
+        """Whether heights were smoothed."""
+        return self.at_vertices < 1.0
+
+
+NOT_SMOOTHED = KeptNoise(1.0, 0.5)
+"""The weights of the corners are 1/6 each when squared and averaged over a face, together 1/2."""
+
+
 def noise_of_points(patches: SurfacePatches, points: FloatArray, within: float, rise: float) -> float:
     """Standard error of the points [m] about the faces between the patches; 0 where there are no faces.
 
@@ -94,8 +116,8 @@ def settled(patches: SurfacePatches, points: FloatArray, limits: HeightLimits) -
     return patches
 
 
-def smoothed(patches: SurfacePatches, limits: HeightLimits) -> tuple[SurfacePatches, float]:
-    """Copy with heights weighed against a smooth surface, and the share of a cell's error that its height keeps.
+def smoothed(patches: SurfacePatches, limits: HeightLimits) -> tuple[SurfacePatches, KeptNoise]:
+    """Copy with heights weighed against a smooth surface, and what these keep of the noise of a cell's mean.
 
     The ground's own bends are what the bends of the heights have beyond the noise: their median, as boulders are the
     business of ``fitted``. Maximum of the posterior probability for independent normal errors and bends (Wahba, "Spline
@@ -105,11 +127,11 @@ def smoothed(patches: SurfacePatches, limits: HeightLimits) -> tuple[SurfacePatc
     counts = (patches.ends - patches.firsts).astype(np.int32)
     usual = float(np.median(counts[patches.is_ground])) if patches.is_ground.any() else 1.0
     if limits.noise <= UNSTEADY * np.sqrt(usual):
-        return patches, 1.0
+        return patches, NOT_SMOOTHED
     links = patches.links(limits.rise)
     bends, variances = bends_of_patches(patches.heights, counts, links)
     if not len(bends):
-        return patches, 1.0
+        return patches, NOT_SMOOTHED
     variance, least = limits.noise * limits.noise, LEAST_BENDS * limits.noise * limits.noise
     usual_bend = float(np.median(np.abs(bends))) / MEDIAN_OF_ERRORS
     of_most, of_all = (
@@ -117,18 +139,24 @@ def smoothed(patches: SurfacePatches, limits: HeightLimits) -> tuple[SurfacePatc
         for square in (usual_bend * usual_bend, float((bends * bends).mean()))
     )
     heights = smoothed_heights(patches.heights, counts, links, variance / of_most, ROUNDS)
-    return replace(patches, heights=heights), float(np.sqrt(_kept_variance(variance / of_all / usual)))
+    return replace(patches, heights=heights), _kept_noise(variance / of_all / usual)
 
 
-def _kept_variance(stiffness: float) -> float:
-    """Mean of the share of noise that smoothing lets through, over all frequencies of a square grid."""
+def _kept_noise(stiffness: float) -> KeptNoise:
+    """Means of what smoothing lets through of noise, over all frequencies of a square grid.
+
+    On a face, the product of two weights of corners is 1/12 on average and the square of one 1/6. So of a frequency
+    comes 1/2 plus a third of the mean cosine along the three edges, either diagonal being as likely.
+    """
     angles = [math.pi * (step + 0.5) / FREQUENCIES for step in range(2 * FREQUENCIES)]
     cosine, sine = np.array([math.cos(angle) for angle in angles]), np.array([math.sin(angle) for angle in angles])
     both, turned = cosine[:, None] * cosine, sine[:, None] * sine
     cosines = (cosine[:, None], cosine, both - turned, both + turned)  # of x, y, x + y and x - y
     along_x, along_y, *diagonal = (4.0 * (1.0 - one) * (1.0 - one) for one in cosines)
     bend = along_x + along_y + ACROSS * (diagonal[0] + diagonal[1])
-    return float((1.0 / (1.0 + stiffness * bend)).mean())
+    share = 1.0 / (1.0 + stiffness * bend)
+    between = 0.5 + (cosine[:, None] + cosine + 0.5 * (cosines[2] + cosines[3])) / 6.0
+    return KeptNoise(float(share.mean()), float((between * share).mean()))
 
 
 def fitted(patches: SurfacePatches, points: FloatArray, limits: HeightLimits, is_smoothed: bool) -> SurfacePatches:

@@ -20,7 +20,14 @@ from mbf_mesh_nav.building.decimation import DecimatedMesh, carried_errors, deci
 from mbf_mesh_nav.building.map_facts import MapFacts, map_facts
 from mbf_mesh_nav.building.surface import BuiltSurface, SurfaceParameters, build_surface
 from mbf_mesh_nav.files.map_header import MapHeader, header_comments
-from mbf_mesh_nav.files.vertex_errors import COORDINATES, FORMAT, HEIGHT_ERROR, vertex_records
+from mbf_mesh_nav.files.vertex_errors import (
+    COORDINATES,
+    FORMAT,
+    HEIGHT_ERROR,
+    PLACE_ERROR,
+    VertexErrors,
+    vertex_records,
+)
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 FACE = np.dtype([("count", "u1"), ("corners", "<i4", (3,))])
@@ -78,13 +85,13 @@ def build_map(
         surface = build_surface(cloud.points, parameters, on_step)
     except MeshError as error:
         raise MeshError(", ".join(map(str, files)), error.reasons, error.hint) from error
-    facts, errors = map_facts(cloud, surface), surface.height_errors
+    facts, errors = map_facts(cloud, surface), VertexErrors(surface.height_errors, surface.place_errors)
     mesh = DecimatedMesh(surface.vertices, surface.faces)
     if parameters is not None and is_decimated:
         on_step("decimation")
         mesh = decimated(surface.vertices, surface.faces, parameters.decimation_bound)
-        errors = carried_errors(mesh, surface.vertices, errors)
-        facts = facts.of_decimated(mesh, errors)
+        errors = carried_errors(mesh, surface.vertices, surface.faces, errors)
+        facts = facts.of_decimated(mesh, errors.of_vertices)
     on_step(f"writing {out.name}")
     write_map(
         out,
@@ -97,15 +104,15 @@ def build_map(
 
 
 def write_map(
-    out: Path, vertices: FloatArray, faces: IntArray, header: MapHeader, errors: FloatArray | None = None
+    out: Path, vertices: FloatArray, faces: IntArray, header: MapHeader, errors: VertexErrors | None = None
 ) -> None:
     """Write a mesh as a binary PLY of eight-byte coordinates; a file of that name is replaced when it is complete.
 
     Parameters
     ----------
     vertices, faces : (V, 3) float64 [m], (F, 3) int32
-    errors : (V,) float64, optional
-        Standard errors of the heights [m]; None = the header's holds for all.
+    errors : VertexErrors, optional
+        Standard errors of the heights; None = the header's holds for all.
 
     Raises
     ------
@@ -113,7 +120,7 @@ def write_map(
         It cannot be written.
     """
     lines = ["ply", FORMAT, *header_comments(header), f"element vertex {len(vertices)}"]
-    lines += COORDINATES if errors is None else [*COORDINATES, HEIGHT_ERROR]
+    lines += COORDINATES if errors is None else [*COORDINATES, HEIGHT_ERROR, PLACE_ERROR]
     lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
     records = np.empty(len(faces), dtype=FACE)
     records["count"], records["corners"] = 3, faces

@@ -87,6 +87,8 @@ class BuiltSurface:
         Of points above (+) and below (-) the faces [m]; NaN for points of no face, such as those of trees.
     height_errors : (V,) float64
         Standard errors of the heights of the vertices [m], see ``building.height_errors``.
+    place_errors : (V,) float64
+        Those of the heights of places on the faces around them [m].
     """
 
     vertices: FloatArray
@@ -99,6 +101,7 @@ class BuiltSurface:
     is_used: BoolArray
     distances: Float32Array
     height_errors: FloatArray
+    place_errors: FloatArray
 
 
 def build_surface(
@@ -137,8 +140,8 @@ def build_surface(
     limits = HeightLimits(0.0, chosen.ground_thickness, chosen.step_height, chosen.clearance, rise)
     limits = limits.with_noise(noise_of_points(patches, kept, rise, rise))
     patches = without_false_ground(settled(patches, kept, limits), limits, chosen.obstacle_points)
-    patches, kept_error = smoothed(patches, limits)
-    patches = fitted(patches, kept, limits, kept_error < 1.0)
+    patches, kept_noise = smoothed(patches, limits)
+    patches = fitted(patches, kept, limits, kept_noise.is_less)
     on_step("holes")
     patches = without_holes(patches, chosen.hole_width, rise, chosen.clearance)
     on_step("faces")
@@ -153,10 +156,10 @@ def build_surface(
     on_step("error")
     arrays = (patches.firsts, patches.ends, patches.centres, patches.heights)
     distances = distances_to_faces(kept, *arrays, links, is_used, cell, limits.step)
-    errors = height_errors(patches, distances, links, is_used, kept_error)[is_used]
+    errors = [each[is_used] for each in height_errors(patches, distances, links, is_used, kept_noise)]
     vertices, faces = _compact(np.column_stack([patches.centres, patches.heights]), faces)
     return BuiltSurface(
-        vertices, faces, patches, kept, is_outlier, is_obstacle, is_small & ~is_used, is_used, distances, errors
+        vertices, faces, patches, kept, is_outlier, is_obstacle, is_small & ~is_used, is_used, distances, *errors
     )
 
 

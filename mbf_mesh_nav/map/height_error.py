@@ -1,10 +1,11 @@
 """What a layer keeps free because the heights of a map are not exact.
 
-A map of ``mbf map build`` states the standard error of the height of each vertex; maps of earlier versions have one
-number for all. The difference of two heights that are wrong independently has sqrt(2) times that error, so a slope over
-a length L may be steeper than it is on the map by atan(sqrt(2) error / L). Layers that judge slopes and steps take this
-off their limits. Layers that judge unevenness by itself, such as ``roughness``, do not: errors of the heights make
-every surface rougher and none smoother.
+A map of ``mbf map build`` states the standard error of the height of each vertex, and of places on the faces around it,
+where noise is the mean of that of three vertices; maps of earlier versions have one number for all. The difference of
+two heights that are wrong independently has sqrt(2) times that error, so a slope over a length L may be steeper than it
+is on the map by atan(sqrt(2) error / L). Layers that judge slopes and steps take this off their limits. Layers that
+judge unevenness by itself, such as ``roughness``, do not: errors of the heights make every surface rougher and none
+smoother.
 """
 
 from __future__ import annotations
@@ -43,6 +44,12 @@ def errors_for(layer: MeshLayer) -> Errors:
     if stated is None and layer.height_errors is not None:
         return layer.height_errors
     return stated or 0.0
+
+
+def place_errors_for(layer: MeshLayer) -> Errors:
+    """As ``errors_for``, of places on the faces around the vertices, where wheels stand."""
+    errors = errors_for(layer)
+    return errors if isinstance(errors, float) or layer.place_errors is None else layer.place_errors
 
 
 def usual_error(errors: Errors) -> float:

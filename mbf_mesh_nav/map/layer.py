@@ -58,6 +58,8 @@ class LayerContext:
         Frame of all coordinates.
     height_errors : (V,) float64, optional
         Standard errors of the heights of the vertices [m]; None = the map does not state them vertex by vertex.
+    place_errors : (V,) float64, optional
+        Those of places on the faces around the vertices [m]; None = as those of the vertices.
     """
 
     name: str
@@ -67,6 +69,7 @@ class LayerContext:
     inputs: tuple[MeshLayer, ...] = ()
     frame_id: str = "map"
     height_errors: FloatArray | None = None
+    place_errors: FloatArray | None = None
 
 
 class MeshLayer(map_layer.MapLayer):
@@ -93,6 +96,7 @@ class MeshLayer(map_layer.MapLayer):
         self.locator = context.locator
         self.inputs = context.inputs
         self.height_errors = context.height_errors
+        self.place_errors = context.height_errors if context.place_errors is None else context.place_errors
         self._costs: CostArray = np.zeros(context.topology.vertex_count, dtype=np.float32)
         self._lethal: LethalArray = np.zeros(context.topology.vertex_count, dtype=np.bool_)
 

@@ -94,7 +94,8 @@ def build_mesh_map(
     mesh_map.footprint, mesh_map.max_turning_slope = parameters.footprint, parameters.max_turning_slope
     if plan:
         if (errors := read_vertex_errors(Path(file)) if file else None) is not None:
-            mesh_map.height_errors = errors_on_mesh(errors, mesh_map.internal_to_input, mesh_map.faces)
+            on_mesh = errors_on_mesh(errors, mesh_map.internal_to_input, mesh_map.faces)
+            mesh_map.height_errors, mesh_map.place_errors = on_mesh
         else:
             stated = height_error_of(file)
             plan = [replace(one, parameters=with_height_error(one.parameters, stated)) for one in plan]
@@ -154,8 +155,9 @@ def _wrong_inputs(planned: PlannedLayer[MeshLayer]) -> list[str]:
 
 def digest_of(mesh_map: MeshMap) -> str:
     """Hexadecimal SHA-256 of the mesh and, where its file states them, of the errors of its heights."""
-    errors, digest = mesh_map.height_errors, mesh_map.topology.digest()
-    return digest if errors is None else hashlib.sha256(digest.encode() + errors.tobytes()).hexdigest()
+    digest, stated = mesh_map.topology.digest(), (mesh_map.height_errors, mesh_map.place_errors)
+    content = b"".join(errors.tobytes() for errors in stated if errors is not None)
+    return hashlib.sha256(digest.encode() + content).hexdigest() if content else digest
 
 
 def compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer[MeshLayer]], cache_dir: str) -> LayerGraph:
@@ -166,8 +168,8 @@ def compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer[MeshLayer]], c
     for planned in plan:
         inputs = tuple(layers[name] for name in planned.entry.reads)
         name, settings = planned.entry.name, cast(LayerParameters, planned.parameters)
-        surface = mesh_map.topology, mesh_map.locator
-        context = LayerContext(name, *surface, settings, inputs, mesh_map.frame_id, mesh_map.height_errors)
+        surface, errors = (mesh_map.topology, mesh_map.locator), (mesh_map.height_errors, mesh_map.place_errors)
+        context = LayerContext(name, *surface, settings, inputs, mesh_map.frame_id, *errors)
         layer = planned.layer_class(context)
         stored = cache.load(layer) if cache and layer.cacheable else None
         if stored is not None:

@@ -41,10 +41,13 @@ class MeshMap(SnapshotAnswers):
         Frame of all coordinates.
     height_errors : (V,) float64, optional
         Standard errors of the heights of the vertices [m]; None if the map's file does not state them one by one.
+    place_errors : (V,) float64, optional
+        Those of places on the faces around the vertices [m].
     """
 
     layers: LayerGraph
     height_errors: FloatArray | None = None
+    place_errors: FloatArray | None = None
 
     def __init__(
         self,

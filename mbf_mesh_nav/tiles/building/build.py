@@ -74,8 +74,8 @@ class TileBuilder:
         own = np.arange(len(part.vertices), dtype=np.int32), np.arange(len(part.faces), dtype=np.int32)
         topology = build_topology(CheckedMesh(part.vertices, part.faces, *own, own[0]))
         part_map = MeshMap(topology, self._settings.frame_id)
-        if part.height_errors is not None:
-            part_map.height_errors = part.height_errors[topology.internal_to_input]
+        if part.errors is not None:
+            part_map.height_errors, part_map.place_errors = part.errors.of(topology.internal_to_input)
         layers = compute_layers(part_map, self._plan, "")
         # 2. The core comes first, otherwise all keep the order in which neighbours lie close in memory.
         is_core_face = topology.internal_to_input_faces < part.core_faces

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.config.bounded_files import special_file
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
+from mbf_mesh_nav.files.vertex_errors import VertexErrors
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.tiles.tile import TileKey
@@ -29,14 +30,14 @@ RINGS = 3
 class TilePart:
     """A part of the map: vertices (n, 3) [m], their numbers (n,) in the map, faces (m, 3), the core's first.
 
-    ``height_errors`` (n,) are the standard errors of the heights [m], None where the map has none for each vertex.
+    ``errors`` are the standard errors of the heights of the vertices (n,), None where the map has none for each.
     """
 
     vertices: FloatArray
     numbers: NDArray[np.int64]
     faces: IntArray
     core_faces: int
-    height_errors: FloatArray | None = None
+    errors: VertexErrors | None = None
 
 
 class TileSource(ABC):
@@ -62,12 +63,12 @@ class MeshSource(TileSource):
     ----------
     vertices, faces : (V, 3) float64 [m], (F, 3) int32
         A vertex's number in the map is its place here.
-    height_errors : (V,) float64, optional
-        Standard errors of the heights [m], if the map states them for each vertex.
+    errors : VertexErrors, optional
+        Standard errors of the heights, if the map states them for each vertex.
     """
 
-    def __init__(self, vertices: FloatArray, faces: IntArray, height_errors: FloatArray | None = None) -> None:
-        self._vertices, self._faces, self._errors = vertices, faces, height_errors
+    def __init__(self, vertices: FloatArray, faces: IntArray, errors: VertexErrors | None = None) -> None:
+        self._vertices, self._faces, self._errors = vertices, faces, errors
         corners = vertices[:, :2][faces]
         self._centroids = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0
 
@@ -87,13 +88,14 @@ class MeshSource(TileSource):
             touched = chosen[self._faces].any(axis=1)
             chosen[self._faces[touched]] = True
         part = _numbered_part(self._vertices, self._faces, core, touched & ~core)
-        return part if self._errors is None else replace(part, height_errors=self._errors[part.numbers])
+        return part if self._errors is None else replace(part, errors=self._errors.of(part.numbers))
 
     def digest(self) -> str:
         """Of vertices, faces and the errors of the heights."""
         digest = hashlib.sha256(np.ascontiguousarray(self._vertices).tobytes())
         digest.update(np.ascontiguousarray(self._faces).tobytes())
-        digest.update(b"" if self._errors is None else self._errors.tobytes())
+        for errors in self._errors or ():
+            digest.update(errors.tobytes())
         return digest.hexdigest()
 
     def _cells(self, tile_size: float) -> NDArray[np.int64]:

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from surveyed_ground import flat, from_wrong_poses, ground, hills, post
 
 from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
-from mbf_mesh_nav.building.heights import HeightLimits, smoothed
+from mbf_mesh_nav.building.heights import NOT_SMOOTHED, HeightLimits, smoothed
 from mbf_mesh_nav.building.map_facts import map_facts
 from mbf_mesh_nav.building.surface import build_surface
 from mbf_mesh_nav.kernels.building.patches import STEP_X, STEP_Y, link_patches
@@ -141,5 +141,5 @@ def test_noise_widens_what_counts_as_ground_and_never_narrows_it():
 def test_steady_heights_are_left_as_they_are(rng):
     surface = build_surface(ground(rng, hills))
     limits = HeightLimits(0.02, 0.1, 0.2, 1.5, 0.6)
-    assert smoothed(surface.patches, limits) == (surface.patches, 1.0)
-    assert smoothed(replace(surface.patches), limits._replace(noise=0.1))[1] < 1.0
+    assert smoothed(surface.patches, limits) == (surface.patches, NOT_SMOOTHED)
+    assert smoothed(replace(surface.patches), limits._replace(noise=0.1))[1].is_less

@@ -10,9 +10,10 @@ from surveyed_ground import flat, from_wrong_poses, ground, hills
 from mbf_mesh_nav.building.decimation import carried_errors, decimated, decimated_to
 from mbf_mesh_nav.building.map_build import build_map
 from mbf_mesh_nav.building.surface import build_surface
-from mbf_mesh_nav.files.vertex_errors import read_vertex_errors
+from mbf_mesh_nav.files.vertex_errors import VertexErrors, read_vertex_errors
 from mbf_mesh_nav.kernels.building.disagreement import sums_around
 from mbf_mesh_nav.kernels.building.patches import link_patches
+from mbf_mesh_nav.map.mesh_map import MeshMap
 
 BOULDERS = np.array([(x, y) for x in (3.0, 5.5, 8.0, 10.5, 13.0) for y in (3.0, 6.0, 9.0)])
 RADIUS, HEIGHT = 0.25, 0.25
@@ -92,7 +93,9 @@ def test_the_map_file_keeps_the_error_of_each_vertex(tmp_path):
     rng = np.random.default_rng(35)
     write_ply(tmp_path / "scan.ply", from_wrong_poses(rng, ground(rng, with_boulders)))
     facts, surface, _ = build_map([tmp_path / "scan.ply"], tmp_path / "map.ply")
-    np.testing.assert_array_equal(read_vertex_errors(tmp_path / "map.ply"), surface.height_errors.astype(np.float32))
+    errors = read_vertex_errors(tmp_path / "map.ply")
+    np.testing.assert_array_equal(errors.of_vertices, surface.height_errors.astype(np.float32))
+    np.testing.assert_array_equal(errors.of_places, surface.place_errors.astype(np.float32))
     assert facts.height_error == pytest.approx(rms(surface.height_errors))
 
 
@@ -100,9 +103,10 @@ def test_a_decimated_surface_has_the_errors_of_what_lies_around_its_vertices():
     rng = np.random.default_rng(36)
     surface = build_surface(from_wrong_poses(rng, ground(rng, with_boulders)))
     whole = surface.vertices, surface.faces
-    assert carried_errors(decimated(*whole, 1e-6), surface.vertices, surface.height_errors) is surface.height_errors
+    stated = VertexErrors(surface.height_errors, surface.place_errors)
+    assert carried_errors(decimated(*whole, 1e-6), *whole, stated) is stated
     mesh = decimated_to(*whole, 0.25)
-    errors = carried_errors(mesh, surface.vertices, surface.height_errors)
+    errors, _ = carried_errors(mesh, *whole, stated)
     away = from_boulders(*mesh.vertices[:, :2].T)
     assert rms(errors[away < 0.4]) > 1.5 * np.median(errors)
     assert rms(errors) > rms(surface.height_errors), "decimation adds its own"
@@ -111,5 +115,42 @@ def test_a_decimated_surface_has_the_errors_of_what_lies_around_its_vertices():
 def test_on_gentle_hills_decimation_adds_what_its_faces_are_off():
     surface = build_surface(ground(np.random.default_rng(37), hills))
     mesh = decimated_to(surface.vertices, surface.faces, 0.25)
-    errors = carried_errors(mesh, surface.vertices, np.zeros(len(surface.vertices)))
-    assert 0.5 * mesh.error_rms < rms(errors) < 2.0 * mesh.error_rms
+    exact = np.zeros(len(surface.vertices))
+    for errors in carried_errors(mesh, surface.vertices, surface.faces, VertexErrors(exact, exact)):
+        assert 0.5 * mesh.error_rms < rms(errors) < 2.0 * mesh.error_rms
+
+
+def differences(vertices, faces, truth, rng, length=0.55):
+    """How wrong the difference of two heights on a map (n,) is, over sqrt(2), at random places `length` apart [m]."""
+    on_map = MeshMap.from_arrays(vertices, faces).locator
+    places, angles = rng.uniform((2.0, 2.0), (14.0, 10.0), (4000, 2)), rng.uniform(0.0, 2.0 * np.pi, 4000)
+    wrong = []
+    for xy in (places, places + length * np.column_stack([np.cos(angles), np.sin(angles)])):
+        _, lengths = on_map.cast_rays(np.column_stack([xy, np.full(4000, 50.0)]), np.tile([0.0, 0.0, -1.0], (4000, 1)))
+        wrong.append(50.0 - lengths - truth(*xy.T))
+    return (wrong[0] - wrong[1]) / np.sqrt(2.0)
+
+
+def test_between_the_vertices_heights_differ_by_what_is_stated_of_places():
+    rng = np.random.default_rng(38)
+    surface = build_surface(ground(rng, hills))
+    found = rms(differences(surface.vertices, surface.faces, hills, rng))
+    assert 0.95 * found < np.median(surface.place_errors) < 1.25 * found < np.median(surface.height_errors)
+
+
+def test_places_of_a_decimated_surface_are_less_wrong_than_its_vertices_and_not_better_than_they_are():
+    rng = np.random.default_rng(40)
+    surface = build_surface(ground(rng, hills))
+    whole, stated = (surface.vertices, surface.faces), VertexErrors(surface.height_errors, surface.place_errors)
+    mesh = decimated_to(*whole, 0.25)
+    of_vertices, of_places = carried_errors(mesh, *whole, stated)
+    found = rms(differences(mesh.vertices, mesh.faces, hills, rng))
+    assert found < np.median(of_places) < 0.85 * np.median(of_vertices)
+
+
+@pytest.mark.parametrize("relief", [flat, hills])
+def test_where_heights_are_smoothed_places_are_not_better_than_they_are(relief):
+    rng = np.random.default_rng(39)
+    surface = build_surface(from_wrong_poses(rng, ground(rng, relief)))
+    found = rms(differences(surface.vertices, surface.faces, relief, rng))
+    assert found < np.median(surface.place_errors) <= np.median(surface.height_errors)

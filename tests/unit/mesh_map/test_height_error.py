@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from mbf_mesh_nav.building.map_build import write_map
 from mbf_mesh_nav.files.map_header import MapHeader, read_map_header
 from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.files.vertex_errors import EARLIER_VERTEX, VERTEX, VertexErrors, read_vertex_errors
 from mbf_mesh_nav.kernels.layers.footprint_settling import settle_footprints, wheel_directions
 from mbf_mesh_nav.kernels.layers.wheel_errors import errors_below_wheels
 from mbf_mesh_nav.layers.height_diff import HeightDiffLayer
@@ -47,9 +48,10 @@ def noisy_plane():
 def map_file(tmp_path):
     """A ramp of 0.55 rad, and a function that writes it with an error of its heights, or one of each vertex."""
 
-    def write(height_error, errors=None):
+    def write(height_error, errors=None, of_places=None):
         file = tmp_path / f"ramp_{height_error}.ply"
-        write_map(file, *ramp(0.55), MapHeader((0.0, 0.0, 0.0), 0.02, 0.04, height_error), errors)
+        stated = None if errors is None else VertexErrors(errors, errors if of_places is None else of_places)
+        write_map(file, *ramp(0.55), MapHeader((0.0, 0.0, 0.0), 0.02, 0.04, height_error), stated)
         return str(file)
 
     return write
@@ -159,6 +161,47 @@ def test_a_map_file_with_an_impossible_error_of_a_vertex_is_refused(map_file, wr
     file = map_file(0.02, np.where(ONE_BAD_PLACE > 0.0, wrong, 0.01))
     with pytest.raises(MeshError, match=r"height_error of its vertices: expected finite numbers of at least 0"):
         built(file)
+
+
+def test_limits_of_the_footprint_count_with_places_and_the_belly_with_vertices():
+    mesh = MeshMap.from_heights(np.random.default_rng(4).normal(0.0, 0.08, (14, 14)), 0.2, 0.2)
+    of_vertices, of_places = np.full(14 * 14, 0.02), np.full(14 * 14, 0.012)
+    chosen = TiltLayer.Parameters(rigid=True)
+    surface = "layer", mesh.topology, mesh.locator
+    both = TiltLayer(LayerContext(*surface, chosen, height_errors=of_vertices, place_errors=of_places))
+    both.recompute()
+    vertices, places = (computed(mesh, TiltLayer, errors, rigid=True) for errors in (of_vertices, of_places))
+    np.testing.assert_allclose(both.limits(), places.limits())
+    assert both.room_below == vertices.room_below < places.room_below
+    assert (both.allowed | ~vertices.allowed).all() and (places.allowed | ~both.allowed).all()
+    assert places.allowed.sum() > both.allowed.sum() > vertices.allowed.sum()
+    slopes = TiltLayer.Parameters(rigid=True, ground_clearance=np.inf)
+    without_belly = TiltLayer(LayerContext(*surface, slopes, height_errors=of_vertices, place_errors=of_places))
+    without_belly.recompute()
+    of_places_alone = computed(mesh, TiltLayer, of_places, rigid=True, ground_clearance=np.inf)
+    np.testing.assert_array_equal(without_belly.allowed, of_places_alone.allowed)
+
+
+def test_a_map_file_keeps_the_errors_of_places(map_file):
+    file = Path(map_file(0.02, ONE_BAD_PLACE, 0.5 * ONE_BAD_PLACE))
+    np.testing.assert_allclose(read_vertex_errors(file).of_vertices, ONE_BAD_PLACE)
+    np.testing.assert_allclose(read_vertex_errors(file).of_places, 0.5 * ONE_BAD_PLACE)
+    mesh_map = built(str(file))
+    np.testing.assert_allclose(mesh_map.place_errors, 0.5 * mesh_map.height_errors)
+    assert mesh_map.layers["steepness"].place_errors is mesh_map.place_errors
+
+
+def test_a_map_file_of_an_earlier_version_states_its_vertices_errors_for_places_too(tmp_path, map_file):
+    header, end, body = Path(map_file(0.02, ONE_BAD_PLACE, 0.5 * ONE_BAD_PLACE)).read_bytes().partition(b"end_header\n")
+    records = np.frombuffer(body, dtype=VERTEX, count=21 * 21)
+    older = np.empty(len(records), dtype=EARLIER_VERTEX)
+    older["position"], older["height_error"] = records["position"], records["height_error"]
+    file = tmp_path / "earlier.ply"
+    header = header.replace(b"property float place_error\n", b"")
+    file.write_bytes(header + end + older.tobytes() + body[records.nbytes :])
+    np.testing.assert_allclose(read_vertex_errors(file).of_vertices, ONE_BAD_PLACE)
+    np.testing.assert_array_equal(*read_vertex_errors(file))
+    assert len(read_mesh(file)[0]) == 21 * 21
 
 
 def test_one_error_of_all_vertices_narrows_the_tilt_as_one_number_does():

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from mbf_abstract.cli import make_app
 from mbf_mesh_nav.building.map_build import write_map
 from mbf_mesh_nav.files.map_header import MapHeader
+from mbf_mesh_nav.files.vertex_errors import VertexErrors
 from mbf_mesh_nav.map.map_builder import build_mesh_map
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.mesh.densify import densify
@@ -63,7 +64,7 @@ def test_the_layers_are_those_of_a_configuration(heights, tmp_path):
 
 def test_tiles_of_a_built_map_count_with_the_error_of_each_vertex(heights, tmp_path):
     vertices, faces = heightfield_mesh(np.load(heights), SPACING, SPACING)
-    errors = np.random.default_rng(5).uniform(0.0, 0.1, len(vertices))
+    errors = VertexErrors(*np.random.default_rng(5).uniform(0.0, [[0.1], [0.05]], (2, len(vertices))))
     file, config, differ = tmp_path / "mesh.ply", tmp_path / "robot.yaml", 0
     config.write_text(JUDGING, "utf-8")
     write_map(file, vertices, faces, MapHeader((0, 0, 0), 0, 0, 0.05), errors)
