@@ -30,7 +30,7 @@ def refuse_cut_file(path: Path) -> None:
     ValueError
         The header has no numbers where they belong.
     """
-    checks = {".ply": _check_ply, ".off": _check_off, ".stl": _check_stl, ".obj": _check_obj}
+    checks = {".ply": _check_ply, ".off": _check_off, ".stl": _check_stl, ".obj": _check_obj, ".glb": _check_glb}
     check = checks.get(path.suffix.lower())
     if check is not None:
         with path.open("rb") as file:
@@ -51,6 +51,16 @@ def _check_ply(path: Path, file: BinaryIO) -> None:
     if is_text:
         faces_last = list(promised)[-1:] == ["face"]
         _compare(path, promised, _count_lines((line for line in file if line.strip()), faces_last))
+
+
+def _check_glb(path: Path, file: BinaryIO) -> None:
+    """The header of binary glTF 2.0 holds the length of the file."""
+    header = file.read(12)
+    if header[:4] != b"glTF" or len(header) < 12:
+        return  # the reader reports the error
+    expected, found = int.from_bytes(header[8:12], "little"), path.stat().st_size
+    if found < expected:
+        raise MeshError(str(path), [f"the file is cut off: expected {expected} bytes, found {found}"])
 
 
 def _check_off(path: Path, file: BinaryIO) -> None:

@@ -99,11 +99,13 @@ def _read_text(path: Path, file: BinaryIO, record: np.dtype[np.void], count: int
 
 def _decompressed(path: Path, file: BinaryIO, record: np.dtype[np.void], count: int) -> NDArray[np.void]:
     """Records out of a compressed block, in which one field's values of all points stand after the other's."""
-    sizes = np.frombuffer(file.read(8), dtype="<u4")
-    expected = count * record.itemsize
-    if len(sizes) < 2 or int(sizes[1]) != expected:
-        found = int(sizes[1]) if len(sizes) == 2 else 0
-        raise MeshError(str(path), [f"its compressed block holds {found} bytes, expected {expected}"])
+    head, expected = file.read(8), count * record.itemsize
+    if len(head) < 8:
+        text = f"the file is cut off: expected the sizes of a compressed block in 8 bytes, found {len(head)}"
+        raise MeshError(str(path), [text])
+    sizes = np.frombuffer(head, dtype="<u4")
+    if int(sizes[1]) != expected:
+        raise MeshError(str(path), [f"its compressed block holds {sizes[1]} bytes, expected {expected}"])
     block = np.frombuffer(file.read(int(sizes[0])), dtype=np.uint8)
     if len(block) < sizes[0]:
         raise MeshError(str(path), [f"the file is cut off: expected {sizes[0]} compressed bytes, found {len(block)}"])

@@ -50,6 +50,8 @@ def read_ply_points(path: Path, max_points: int) -> StoredPoints:
         else:
             raise MeshError(str(path), ["there is no element 'vertex' in its header"])
         refuse_count(path, element.count, max_points)
+        if element.count == 0:
+            raise MeshError(str(path), ["there is no point in it: expected an element 'vertex' of 1 or more, got 0"])
         if element.has_lists or any(other.has_lists for other in before):
             raise MeshError(str(path), ["a list in or before the element 'vertex' is not read"])
         stored = (
@@ -61,9 +63,13 @@ def read_ply_points(path: Path, max_points: int) -> StoredPoints:
 
 
 def has_faces(path: Path) -> bool:
-    """Whether a PLY file is a mesh by its header; raises ``MeshError`` for a header that is none."""
+    """Whether a PLY file is a mesh by its header; raises ``MeshError`` for a header that is none.
+
+    Faces without a vertex are none: their file is read, and refused, as a cloud.
+    """
     with path.open("rb") as file:
-        return any(element.name == "face" and element.count for element in _read_header(path, file)[1])
+        counts = {element.name: element.count for element in _read_header(path, file)[1]}
+    return counts.get("face", 0) > 0 and counts.get("vertex", 0) > 0
 
 
 def _read_header(path: Path, file: BinaryIO) -> tuple[str, list[_Element]]:

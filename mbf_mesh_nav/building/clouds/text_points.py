@@ -6,6 +6,7 @@ out, and so is the first line of a .pts file, which holds the number of its poin
 
 from __future__ import annotations
 
+import os
 import warnings
 from itertools import islice
 from pathlib import Path
@@ -69,6 +70,7 @@ def read_rows(
     MeshError
         A row has no such columns or holds something that is no number, or there are fewer than ``count`` rows.
     """
+    start = file.seek(0, os.SEEK_CUR)
     rows = file if count is None else islice((line for line in file if line.strip()), count)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "loadtxt: input contained no data")
@@ -83,10 +85,30 @@ def read_rows(
                 encoding="latin-1",
             )
         except ValueError as error:
-            raise MeshError(str(path), [f"expected a table of numbers: {error}"]) from error
+            reason = _first_wrong_row(file, start, columns, delimiter) or f"expected a table of numbers: {error}"
+            raise MeshError(str(path), [reason]) from error
     if count is not None and len(points) < count:
         raise MeshError(str(path), [f"the file is cut off: expected {count} points, found {len(points)}"])
     return points.reshape(-1, 3)
+
+
+def _first_wrong_row(file: BinaryIO, start: int, columns: tuple[int, int, int], delimiter: str | None) -> str:
+    """What is wrong with the first row from byte ``start`` on that has no numbers in three columns; "" = none."""
+    file.seek(0)
+    before, least = file.read(start).count(b"\n"), max(columns) + 1
+    for number, line in enumerate(file, before + 1):
+        text = line.decode("latin-1")
+        for comment in COMMENTS:
+            text = text.split(comment)[0]
+        words = text.split(delimiter)
+        if not text.strip():
+            continue
+        if len(words) < least:
+            return f"line {number}: expected at least {least} columns, got {len(words)}"
+        for column in columns:
+            if not _is_number(words[column]):
+                return f"line {number}, column {column + 1}: expected a number, got '{words[column].strip():.40}'"
+    return ""
 
 
 def _layout(path: Path, file: BinaryIO) -> tuple[int, tuple[int, int, int], str | None]:

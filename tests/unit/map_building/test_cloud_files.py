@@ -165,6 +165,33 @@ def test_a_header_that_promises_a_thousand_million_points_is_refused_unread(tmp_
     assert "the file is cut off: expected 1000000000 points, found 4" in refusal(file, max_points=2 * 10**9)
 
 
+@pytest.mark.parametrize(
+    ("vertices", "text"),
+    [("", "there is no element 'vertex' in its header"), ("element vertex 0\nproperty float x\n", "no point in it")],
+)
+def test_a_ply_file_with_faces_and_no_vertex_is_refused_for_its_vertices(tmp_path, vertices, text):
+    file = tmp_path / "faces.ply"
+    faces = "element face 1\nproperty list uchar int vertex_indices\nend_header\n3 0 1 2\n"
+    file.write_text(f"ply\nformat ascii 1.0\n{vertices}{faces}")
+    assert text in refusal(file)
+
+
+def test_a_row_of_a_pcd_file_is_named_by_its_line_in_the_file(tmp_path):
+    file = write_pcd(tmp_path / "short.pcd", POINTS, "ascii")
+    lines = file.read_text().splitlines()
+    first = next(number for number, line in enumerate(lines, 1) if line.startswith("DATA")) + 1
+    lines[first] = "1"
+    file.write_text("\n".join(lines))
+    assert re.search(rf"line {first + 1}: expected at least \d columns, got 1", refusal(file))
+
+
+def test_a_pcd_file_cut_off_before_its_compressed_block_names_what_is_missing(tmp_path):
+    file = write_pcd(tmp_path / "cut.pcd", POINTS, "binary_compressed")
+    head, mark, body = file.read_bytes().partition(b"DATA binary_compressed\n")
+    file.write_bytes(head + mark + body[:2])
+    assert "expected the sizes of a compressed block in 8 bytes, found 2" in refusal(file)
+
+
 @pytest.mark.parametrize("form", ["ascii", "binary", "binary_compressed"])
 def test_a_pcd_header_that_promises_too_much_is_refused_unread(tmp_path, form):
     file = write_pcd(tmp_path / "huge.pcd", POINTS, form, promised=10**9)
@@ -215,8 +242,9 @@ def test_the_limit_is_on_all_files_together(tmp_path):
     ("content", "text"),
     [
         ("", "there is no point in it"),
-        ("1 2 3\n1 2\n", "expected a table of numbers"),
-        ("1 2 3\n1 2 three\n", "expected a table of numbers: could not convert string 'three'"),
+        ("1 2 3\n1 2\n", "line 2: expected at least 3 columns, got 2"),
+        ("x;y;z\n# far\n1;2;3\n\n1;2; three\n", "line 5, column 3: expected a number, got 'three'"),
+        ("name,z,y,x\na,1,2,3\nb,4,,6\n", "line 3, column 3: expected a number, got ''"),
         ("a b c\n1 2 3\n", "line 1: expected numbers or the names x, y, z, got 'a b c'"),
     ],
 )

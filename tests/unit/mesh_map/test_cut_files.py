@@ -47,6 +47,17 @@ def test_the_whole_file_is_read(tmp_path, ending):
     assert ending == "stl" or len(read_mesh(file)[1]) == len(FACES)
 
 
+@pytest.mark.parametrize("share", [0.95, 0.5, 0.1])
+def test_a_binary_gltf_that_was_cut_is_refused_with_its_length(tmp_path, share):
+    file, content = tmp_path / "cut.glb", exported("glb")
+    file.write_bytes(content)
+    assert len(read_mesh(file)[1]) == len(FACES)
+    file.write_bytes(content[: int(share * len(content))])
+    found = int(share * len(content))
+    with pytest.raises(MeshError, match=f"the file is cut off: expected {len(content)} bytes, found {found}"):
+        read_mesh(file)
+
+
 def test_a_text_stl_without_its_end_is_refused(tmp_path):
     file, content = tmp_path / "cut.stl", exported("stl_ascii")
     file.write_bytes(content[: int(0.9 * len(content))])
