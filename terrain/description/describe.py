@@ -15,7 +15,7 @@ from terrain.description.masses import mass_of, notes_on_masses, some_of
 from terrain.description.mesh_files import find_file, missing_text
 from terrain.description.outline import Corner, convex_outline, with_few_corners
 from terrain.description.parameters import UrdfRobot
-from terrain.description.running_gear import RunningGear, sides_of, solids_of
+from terrain.description.running_gear import RunningGear, note_on_its_side, sides_of, solids_of
 from terrain.description.solids import Placed
 from terrain.description.stability import Edges, Tipping, clear_angles, seen_from_the_side, tipping
 from terrain.description.urdf import Urdf, link_frames
@@ -80,6 +80,8 @@ class _Describer:
         steering = self._steering_angle()
         speed = self._speed(radius)
         standing = gear.drive != "legged"
+        if not standing and (aside := note_on_its_side(self.urdf, self.frames)):
+            self.notes.append(aside)
         if clearance <= 0.0 and standing:
             self.notes.append("its body touches the ground between the wheels: no ground clearance")
         return RobotDescription(

@@ -8,10 +8,14 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from mbf_abstract.geometry import FloatArray
 from terrain.description.parameters import DriveName
 from terrain.description.solids import Placed
-from terrain.description.urdf import Urdf
+from terrain.description.urdf import Urdf, subtree
+
+BENDING = ("revolute", "continuous")
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,3 +117,28 @@ def sides_of(wheels: Collection[Wheel]) -> tuple[list[Wheel], list[Wheel]]:
     apart = [wheel for wheel in wheels if abs(float(wheel.centre[1]) - middle) > 0.1 * wheel.radius]
     lefts = [wheel for wheel in apart if float(wheel.centre[1]) > middle]
     return lefts, [wheel for wheel in apart if float(wheel.centre[1]) < middle]
+
+
+def note_on_its_side(urdf: Urdf, frames: Mapping[str, FloatArray]) -> str:
+    """Say along which axis the legs of a robot hang if it is not -z, else ""; files of computer graphics have y up.
+
+    Legs stand around the body, so the mean of their ends lies below it. Where it lies farther to one side than below,
+    the robot lies on that side.
+
+    Parameters
+    ----------
+    frames : mapping of str to (4, 4) float64
+        Links in the root link, all joints at 0.
+    """
+    parents = {joint.parent for joint in urdf.joints.values()}
+    bent = {name for joint in urdf.joints.values() if joint.kind in BENDING for name in subtree(urdf, joint.child)}
+    ends = [frames[name][:3, 3] for name in urdf.links if name in bent - parents]
+    if not ends:
+        return ""
+    x, y, z = np.mean(ends, axis=0).tolist()
+    axis, aside = ("x", x) if abs(x) > abs(y) else ("y", y)
+    if abs(aside) <= max(-z, 0.05):
+        return ""
+    side, up = ("-", "") if aside < 0.0 else ("+", "-")
+    lengths = f"{abs(aside):.2f} m along {side}{axis} of '{urdf.root}' and {max(-z, 0.0):.2f} m below it"
+    return f"its legs end {lengths}: it lies on its side. Expected z up (REP 103); in this file {up}{axis} is up"

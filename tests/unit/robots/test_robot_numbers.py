@@ -213,6 +213,17 @@ def test_robots_without_wheels_and_many_joints_are_on_legs(name):
     assert 0.1 < footprint_radii(found.footprint)[0] < footprint_radii(found.footprint)[1] < 0.7
 
 
+@pytest.mark.parametrize("name", ["laikago/laikago.urdf", "laikago/laikago_toes.urdf"])
+def test_a_robot_whose_file_has_y_up_is_said_to_lie_on_its_side(name):
+    (note,) = (note for note in describe(package_file(name)).notes if "lies on its side" in note)
+    assert note.endswith("Expected z up (REP 103); in this file y is up")
+
+
+@pytest.mark.parametrize("name", ["laikago/laikago_toes_zup.urdf", "a1/a1.urdf", "mini_cheetah/mini_cheetah.urdf"])
+def test_a_robot_whose_legs_hang_below_it_does_not_lie_on_its_side(name):
+    assert not any("lies on its side" in note for note in describe(package_file(name)).notes)
+
+
 def test_three_wheels_in_a_star_move_any_way():
     found = describe(UrdfRobot(urdf=str(KIWI)))
     assert found.drive == "omni"
