@@ -17,11 +17,13 @@ from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 PAGE = """\
 <!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
 <style>
 body {{ font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1100px; margin: 2em auto; padding: 0 1em }}
 td {{ padding: 0.15em 1em 0.15em 0; vertical-align: top }} td:first-child {{ color: #666 }}
-.pictures {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(420px, 1fr)); gap: 1.5em }}
+td {{ overflow-wrap: anywhere }}
+.pictures {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(min(420px, 100%), 1fr)); gap: 1.5em }}
 figure {{ margin: 0 }} img {{ width: 100%; border: 1px solid #ddd; image-rendering: pixelated }}
 figcaption {{ color: #555; font-size: 13px }} .failed {{ color: #b00020 }}
 </style></head><body>

@@ -18,12 +18,13 @@ WHOLE_FROM = 1000.0  # numbers that are written without decimals
 FOLDED_FROM = 60  # rows; the metrics of a run are fewer
 
 STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #222; margin: 2em auto; padding: 0 1em; }
+body { font: 15px/1.45 system-ui, sans-serif; color: #222; margin: 2em auto; padding: 0 1em;
+  overflow-wrap: anywhere; }
 h1 { font-size: 1.5em; margin-bottom: 0; } h2 { font-size: 1.15em; margin-top: 2em; }
 .outcome { font-size: 1.15em; font-weight: 600; }
 table { border-collapse: collapse; } td, th { text-align: left; padding: 2px 14px 2px 0; vertical-align: top; }
 th { color: #555; font-weight: 600; border-bottom: 1px solid #ccc; } td:first-child { white-space: nowrap; }
-td, th { overflow-wrap: anywhere; } .wide { overflow-x: auto; }
+.wide { overflow-x: auto; }
 img { max-width: 100%; height: auto; } svg { width: 100%; height: auto; } summary { color: #555; cursor: pointer; }
 .beside { display: grid; grid-auto-flow: column; grid-auto-columns: 1fr; gap: 0 2em; align-items: start; }
 .beside > * { min-width: 0; }
