@@ -30,7 +30,7 @@ from terrain.viewer.scene import (
     wheel_angles,
 )
 
-ABOVE_PINS = 1.6  # height of the robot's label by that of markers, so that it is not on that of the start
+ABOVE_PINS = 2.0  # height of the robot's label by that of markers, so that it is not on that of the start
 AHEAD = 2.0  # s over which the present command is extrapolated
 AHEAD_STEPS = 20
 FIELD_ARROWS = 40  # along the longer side of the field
@@ -60,7 +60,8 @@ class MovingThings:
         self._actors = ActorModels(self._scene, session.recorder.actor_tracks())
         self._angles = np.zeros(len(self._shape.wheels))
         self._time = 0.0
-        self._path: Path | None = None
+        self._path: Path | None = None  # the newest, refined or not
+        self._planned: Path | None = None  # the one that the planner made, with what it knows of its field
         self._goal: Pose | None = None  # one that is not marked yet
         gui = server_page.gui
         self._plan = Overlay(gui, "plan")
@@ -71,6 +72,7 @@ class MovingThings:
         self._tracked = Overlay(gui, "tracked objects")
         self._trails: dict[int, deque[FloatArray]] = {}
         session.navigator.server.get_path.listeners.append(self._take_plan)
+        session.navigator.server.refine_path.listeners.append(self._take_refined_plan)
 
     def show_goal(self, goal: Pose) -> None:
         """Mark a goal that is none of the scenario's."""
@@ -120,6 +122,11 @@ class MovingThings:
     def _take_plan(self, handle: AnyGoalHandle) -> None:
         path = None if handle.result is None else handle.result.path
         if path is not None:
+            self._path = self._planned = path
+
+    def _take_refined_plan(self, handle: AnyGoalHandle) -> None:
+        path = None if handle.result is None else handle.result.refined_path
+        if path is not None:
             self._path = path
 
     def _show_plan(self, path: Path | None) -> None:
@@ -128,7 +135,8 @@ class MovingThings:
             self._field.clear()
             return
         self._plan.update(id(path), lambda: add_path(self._scene, "/plan", path.positions, PLANNED))
-        self._field.update(id(path), lambda: self._draw_field(path))
+        if (planned := self._planned) is not None:
+            self._field.update(id(planned), lambda: self._draw_field(planned))
 
     def _draw_field(self, path: Path) -> Any:
         field = self._session.navigator.server.field_view(path)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mbf_abstract.goals.goal_types import RefinePathGoal
 from mbf_abstract.maps.view import GridView, MeshView
 from terrain.scenarios.actors import OtherRobot, Walker
 from terrain.scenarios.scenario import PlanarPose, load_scenario
@@ -11,6 +12,7 @@ from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session, SessionOptions
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
+from terrain.viewer.live.moving import MovingThings
 from terrain.viewer.live.page import LivePage
 from terrain.viewer.live.plots import History
 from terrain.viewer.live.stick import Stick
@@ -57,6 +59,22 @@ def test_on_a_mesh_the_page_shows_layers_plan_field_and_what_is_forbidden(steere
 
     assert nodes == set(NODES) - {"map", "local_map"}
     assert "going to 9.0, 7.0" in words and "follow path" in words and "plan found" in words
+
+
+def test_the_plan_in_the_scene_is_the_refined_one_and_the_field_that_of_the_planner(meadow):
+    with Session(meadow) as session, page_server(18230) as server:
+        things = MovingThings(server, session, 1.0)
+        plan = session.navigator.get_path(session.goals[0], planner="cvp")
+        things.show(0.0, "", is_driving=True)
+        planned = server.scene.get_handle_by_name("/plan").points[:, 0, :2]
+        refined = session.navigator.send(RefinePathGoal(plan.path, "string_pulling")).wait().refined_path
+        things.show(0.1, "", is_driving=True)
+        shown = server.scene.get_handle_by_name("/plan").points[:, 0, :2]
+        assert server.scene.get_handle_by_name("/field") is not None
+
+    np.testing.assert_allclose(planned, plan.path.positions[:-1, :2], atol=1e-5)
+    np.testing.assert_allclose(shown, refined.positions[:-1, :2], atol=1e-5)
+    assert len(shown) != len(planned)
 
 
 def test_on_costmaps_the_page_shows_both_maps():
