@@ -67,7 +67,7 @@ class Lease:
         with self._condition:
             if not self.active or self._writer.stands:
                 return
-            self._emit(EventKind.ROBOT_STOPPED, reason="requested by the lease's owner")
+            self._emit(EventKind.ROBOT_STOPPED, reason="asked by the lease's owner")
             stop = self._writer.begin_stop()
         self._writer.deliver(stop)
 

@@ -134,7 +134,7 @@ def test_every_stop_and_every_change_of_the_lease_is_recorded_once(scene):
     reported = [(event.kind, event.data) for event in scene.memory.events]
     assert reported == [
         (EventKind.LEASE_GRANTED, {"holder": "a"}),
-        (EventKind.ROBOT_STOPPED, {"reason": "requested by the lease's owner"}),
+        (EventKind.ROBOT_STOPPED, {"reason": "asked by the lease's owner"}),
         (EventKind.ROBOT_STOPPED, {"reason": "paused"}),
         (EventKind.LEASE_REVOKED, {"holder": "a", "reason": "done"}),
         (EventKind.GATE_CLOSED, {"holder": "", "reason": "the end"}),
