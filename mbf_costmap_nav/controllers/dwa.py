@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Twist
+from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.failures import no_motion
 from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
 from mbf_abstract.maps.controllers.standing import StandingParameters
@@ -28,7 +29,7 @@ from mbf_costmap_nav.control.sampling_follower import SamplingFollower
 from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score
 from mbf_costmap_nav.critics import CriticParameters
 from mbf_costmap_nav.critics.obstacle_critic import COLLISION
-from mbf_costmap_nav.kernels.control.rollout import clip_velocities, integrate
+from mbf_costmap_nav.kernels.control.rollout import clip_velocities
 from mbf_costmap_nav.plugins import CostmapContext
 
 FloatArray = NDArray[np.float64]
@@ -116,24 +117,23 @@ class DWAController(SamplingFollower):
         for sample in np.argsort(costs, kind="stable").tolist():
             if costs[sample] >= COLLISION:
                 break
-            ramp = rollouts.poses[:, :checked_steps, sample]
-            if is_free(cycle, ramp) and is_free(cycle, self._held(cycle, candidates[sample], checked_steps)):
-                command = Twist.planar(*candidates[sample].tolist())
+            command = Twist.planar(*candidates[sample].tolist())
+            is_slowly = is_free(cycle, rollouts.poses[:, :checked_steps, sample])
+            if is_slowly and self._held_is_free(cycle, command, checked_steps * p.sim_step):
                 return ControlResult(ExePathOutcome.SUCCESS, "", command, hindered_by)
         pose = cycle.request.pose
         text = f"all {len(candidates)} velocities reachable at ({pose.x:.2f}, {pose.y:.2f}) lead into an obstacle"
         return no_motion(self.costmap, pose, f"{text} within {p.sim_time:g} s")
 
-    def _held(self, cycle: ControlCycle, candidate: FloatArray, steps: int) -> Float32Array:
-        """Poses (3, steps) of a robot that takes up a velocity (3,) at once.
+    def _held_is_free(self, cycle: ControlCycle, command: Twist, duration: float) -> bool:
+        """Whether the footprint is free for ``duration`` [s] where a robot drives that takes up a velocity at once.
 
         A quick robot does; the ramp is what a slow one drives. Only a first step that was looked at leads to where the
         arc of this cycle can be driven on in the next.
         """
-        velocities = np.repeat(candidate.astype(np.float32)[:, None, None], steps, axis=1)
-        poses = np.empty_like(velocities)
-        integrate(velocities, cycle.request.pose.yaw, self.parameters.sim_step, poses)
-        return np.asarray(poses[:, :, 0])
+        pose, step = cycle.request.pose, self.parameters.sim_step
+        driven = arc_poses((pose.x, pose.y, pose.yaw), command.vx, command.vy, command.wz, max(duration, step), step)
+        return cycle.footprint.first_collision(cycle.costmap, driven) < 0
 
     def _ramps(self, cycle: ControlCycle, candidates: FloatArray, steps: int) -> Float32Array:
         """Velocities (3, steps, n): from the measured one to each candidate at the accelerations allowed, then held."""

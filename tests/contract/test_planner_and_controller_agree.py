@@ -39,7 +39,7 @@ STOOD = (
     ("costmap", "hybrid_astar", "dwa", 302), ("costmap", "theta_star", "dwa", 302),
     ("costmap", "hybrid_astar", "mppi", 302), ("costmap", "dijkstra", "mppi", 304), ("costmap", "astar", "dwa", 304),
     ("costmap", "hybrid_astar", "dwa", 304), ("costmap", "hybrid_astar", "rotation_shim", 304),
-    ("mesh", "dijkstra", "mppi", 65), ("mesh", "dijkstra", "mppi", 67),
+    ("costmap", "dijkstra", "dwa", 308), ("mesh", "dijkstra", "mppi", 65), ("mesh", "dijkstra", "mppi", 67),
 )  # fmt: skip
 """Drives with sampled motions that stood before their goal until their time was over, crept, or touched something."""
 SAMPLING = (("costmap", "dwa"), ("costmap", "mppi"), ("costmap", "rotation_shim"), ("mesh", "mppi"))

@@ -87,6 +87,8 @@ def integrate(velocities: Float32Array, yaw: float, dt: float, poses: Float32Arr
 
     The heading is carried as a rotated unit vector whose turn per step uses the sine's and cosine's series up to the
     fifth power: exact to 1e-6 rad for up to half a radian a step, and free of library calls, so the loops vectorise.
+    Each step goes along the mean of its two headings (the trapezoidal rule), to 0.03 mm of the arc at 0.5 m/s, 2 rad/s
+    and 0.05 s; along the first of them it would be 1 mm beside it each time.
     """
     _, steps, samples = velocities.shape
     cosine = np.full(samples, np.float32(np.cos(yaw)), dtype=np.float32)
@@ -101,14 +103,15 @@ def integrate(velocities: Float32Array, yaw: float, dt: float, poses: Float32Arr
         out_x, out_y, out_yaw = poses[0, t], poses[1, t], poses[2, t]
         for n in range(samples):
             c, s = cosine[n], sine[n]
-            x[n] += (c * vx[n] - s * vy[n]) * h
-            y[n] += (s * vx[n] + c * vy[n]) * h
             turn = wz[n] * h
             square = turn * turn
             turn_cosine = one - square * (half - square * fourth_factorial)
             turn_sine = turn * (one - square * (sixth - square * fifth_factorial))
             cosine[n] = c * turn_cosine - s * turn_sine
             sine[n] = s * turn_cosine + c * turn_sine
+            mean_cosine, mean_sine = half * (c + cosine[n]), half * (s + sine[n])
+            x[n] += (mean_cosine * vx[n] - mean_sine * vy[n]) * h
+            y[n] += (mean_sine * vx[n] + mean_cosine * vy[n]) * h
             heading[n] += turn
             out_x[n], out_y[n], out_yaw[n] = x[n], y[n], heading[n]
 

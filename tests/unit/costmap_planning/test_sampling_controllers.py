@@ -8,6 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
+from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
@@ -40,10 +41,21 @@ def test_integrated_poses_equal_step_by_step_rotation(seed, yaw):
     x, y, heading = np.zeros(7), np.zeros(7), np.full(7, yaw)
     for t in range(12):
         vx, vy, wz = velocities[:, t].astype(float)
-        x += (vx * np.cos(heading) - vy * np.sin(heading)) * 0.05
-        y += (vx * np.sin(heading) + vy * np.cos(heading)) * 0.05
-        heading += wz * 0.05
+        before, heading = heading, heading + wz * 0.05
+        c, s = 0.5 * (np.cos(before) + np.cos(heading)), 0.5 * (np.sin(before) + np.sin(heading))
+        x += (vx * c - vy * s) * 0.05
+        y += (vx * s + vy * c) * 0.05
     np.testing.assert_allclose(poses[:, -1], [x, y, heading], atol=1e-5)
+
+
+@pytest.mark.parametrize("turn", [-2.0, 0.5, 2.0])
+def test_a_constant_velocity_leads_along_its_arc_to_a_tenth_of_a_millimetre_in_half_a_second(turn):
+    velocities = np.empty((3, 10, 1), dtype=np.float32)
+    velocities[:, :, 0] = np.array([0.5, 0.0, turn])[:, None]
+    poses = np.empty_like(velocities)
+    integrate(velocities, 0.3, 0.05, poses)
+    exact = arc_poses((0.0, 0.0, 0.3), 0.5, 0.0, turn, 0.5, 0.05)
+    np.testing.assert_allclose(poses[:2, :, 0], exact[:, :2].T, atol=2e-4)
 
 
 @settings(max_examples=20, deadline=None)
