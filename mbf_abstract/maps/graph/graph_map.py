@@ -97,6 +97,7 @@ class GraphMap(LayeredMap, DiscMap):
         self._ground_lethal = lethal
         self._ground_costs = np.zeros(len(nodes)) if ground_costs is None else ground_costs
         self._avoided: tuple[AvoidedPlace, ...] = ()
+        self.state = GraphState(np.zeros(len(nodes), dtype=bool), np.full(len(nodes), np.inf), self._ground_costs)
         self._outdated = True
         self.update(None, 0.0)
 
@@ -152,7 +153,8 @@ class GraphMap(LayeredMap, DiscMap):
             if self.obstacles.parameters.enabled:
                 lethal[self.seen_nodes()] = True
         with self.layers.computing(self.inflation):
-            clearance = self._clearances(lethal)
+            seen_before = np.array_equal(lethal, self.state.lethal)  # most scans show nothing new
+            clearance = self.state.clearance if seen_before else self._clearances(lethal)
             costs = self._ground_costs + self.inflation.costs(clearance, self.robot_radius)
         self.state = GraphState(lethal, clearance, costs)
 
