@@ -1,6 +1,5 @@
 import sys
-from importlib.metadata import EntryPoint
-from types import SimpleNamespace
+from importlib.metadata import Distribution, EntryPoint
 
 import pytest
 
@@ -32,6 +31,19 @@ class FreePlanner(MeshPlanner):
     pass
 
 
+class Installed(Distribution):
+    """A distribution of version 1.0."""
+
+    def __init__(self, name):
+        self._name = name
+
+    def read_text(self, filename):
+        return f"Metadata-Version: 2.1\nName: {self._name}\nVersion: 1.0\n" if filename == "METADATA" else None
+
+    def locate_file(self, path):
+        return path
+
+
 @pytest.fixture(autouse=True)
 def nothing_installed(monkeypatch):
     """Hide the entry points of the installed packages."""
@@ -57,7 +69,7 @@ def installed(monkeypatch):
         points = []
         for name, value, distribution in entries:
             point = EntryPoint(name, value, "mbf.planners")
-            vars(point).update(dist=SimpleNamespace(name=distribution, version="1.0"))
+            vars(point).update(dist=Installed(distribution))
             points.append(point)
         monkeypatch.setattr(
             installed_plugins, "installed_points", lambda group: [point for point in points if point.group == group]

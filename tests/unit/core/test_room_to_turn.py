@@ -75,7 +75,7 @@ def test_it_ends_after_the_distance_whatever_becomes_free_in_between():
     for cycle in range(100):
         motion, reason = room.choose(Pose.planar(x, 0), 0.0, MOTIONS, 0.5, blocks(turns) if cycle % 3 else blocks())
         if motion is None:
-            assert "made no room to turn" in reason
+            assert "there is still no room to turn" in reason
             break
         driven += motion != LEFT
         x += 0.04 * (motion != LEFT)
