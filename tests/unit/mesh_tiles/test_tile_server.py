@@ -209,7 +209,7 @@ def test_the_action_interface_plans_on_tiles(tiled_hills, whole_hills, tmp_path)
         assert server.map_views[0] == "safe" and set(server.map_views) == set(server.tiled_map.tiled.index.layers)
         server.set_footprint(0.5)
         assert server.tiled_map.inscribed_radius == 0.5
-        assert "built for a robot of the radius 0.3 m, this one has 0.5 m" in server.notes[-1]
+        assert "built for a robot with a radius of 0.3 m, this one has 0.5 m" in server.notes[-1]
         with pytest.raises(ValueError, match="treats the robot as a disc"):
             server.set_footprint([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
 

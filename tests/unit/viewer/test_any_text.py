@@ -153,4 +153,4 @@ def test_folders_with_odd_names_are_compared(hill_recording, tmp_path):
     )
 
     assert result.exit_code == 0, result.output
-    assert "[/x]" in result.stdout
+    assert "[: SUCCESS" in result.stdout and "b[: SUCCESS" in result.stdout
