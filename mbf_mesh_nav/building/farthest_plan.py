@@ -16,6 +16,7 @@ from mbf_abstract.navigator import Navigator
 from mbf_abstract.server.standing_server import place_robot, read_config_or_map, standing_server
 from mbf_mesh_nav.arrays import BoolArray, FloatArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.snapshot_answers import FORBIDDEN_COST
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,7 @@ def plan_farthest(map_file: Path) -> FarthestPlan:
     cls, config, _ = read_config_or_map(map_file)
     with standing_server(cls, config) as server:
         mesh_map: MeshMap = server.served["mesh_map"].map  # type: ignore[attr-defined]
-        free = ~mesh_map.layers[mesh_map.default_layer or ""].lethal
+        free = ~mesh_map.snapshot().blocked(FORBIDDEN_COST)  # lethal alone would leave the ground beside obstacles
         free_share = float(free.mean())
         ends = farthest_vertices(mesh_map, free)
         if ends is None:
