@@ -136,6 +136,15 @@ def paths_to_keep_free(begin: Pose, track: FloatArray, paths: Sequence[FloatArra
     return np.concatenate([on * (1.0, 0.0), behind, behind[-1] + on * back / norm(back), *others])
 
 
+def in_plane_of(begin: Pose, other: Pose, points: FloatArray) -> FloatArray:
+    """Points (n, 2) [m] in the plane of ``other`` as seen from ``begin``: x ahead, y to the left."""
+    if begin == other:
+        return points
+    frame = Transform(other.position, other.orientation, other.frame_id, "other")
+    on_map = frame.apply(np.column_stack([points, np.zeros(len(points))]))
+    return _on_storey(begin, on_map)
+
+
 def paths_beside(
     start: Pose, own: FloatArray, known: Iterable[TrackedObject], distance: float, same_storey: float
 ) -> Iterator[FloatArray]:

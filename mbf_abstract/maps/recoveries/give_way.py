@@ -36,7 +36,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.manoeuvres import Step
-from mbf_abstract.maps.pull_out import find_pull_out, paths_beside, paths_to_keep_free
+from mbf_abstract.maps.pull_out import find_pull_out, in_plane_of, paths_beside, paths_to_keep_free
 from mbf_abstract.maps.recoveries.manoeuvre_recovery import ManoeuvreParameters, ManoeuvreRecovery
 from mbf_abstract.maps.recoveries.wait import stand
 from mbf_abstract.maps.tracking.objects import Motion
@@ -121,13 +121,14 @@ class GiveWayRecovery(ManoeuvreRecovery):
         """Search a place and drive there section by section; search anew where the drive there is not free."""
         p, token = self.parameters, request.cancel_token
         result = RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
+        course = request.motion.pose()
         for attempt in range(ATTEMPTS):
             if attempt:
                 paused = stand(request, PAUSE)  # somebody who moves there stops before this robot, or passes
                 if not paused.success:
                     return paused
             begin = request.motion.pose()
-            steps = self._manoeuvre(begin, request)
+            steps = self._manoeuvre(begin, course, request)
             if token.cancelled:
                 return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
             if steps is None:
@@ -227,12 +228,15 @@ class GiveWayRecovery(ManoeuvreRecovery):
             one.update(self.on_map(pose, one), now)
 
     # -------------------------------------------------------------------------------------------------- the search
-    def _manoeuvre(self, begin: Pose, request: RecoveryRequest) -> list[Step] | None:
-        """Shortest manoeuvre in the plane of the robot at ``begin`` to a place beside its path and those of others."""
+    def _manoeuvre(self, begin: Pose, course: Pose, request: RecoveryRequest) -> list[Step] | None:
+        """Shortest manoeuvre in the plane of the robot at ``begin`` to a place beside its path and those of others.
+
+        Its path leads on as the robot stood at ``course``, before it set out to a place that is not free any more.
+        """
         p, token = self.parameters, request.cancel_token
         length = p.reach + p.distance
         paths = [rival.points_ahead(length) for rival in self._before(self._rivals())]
-        keep_free = paths_to_keep_free(begin, self.robot.recent_track(), paths, length)
+        keep_free = in_plane_of(begin, course, paths_to_keep_free(course, self.robot.recent_track(), paths, length))
         start, turning_radius = self.on_map(begin), self.min_turning_radius
         known = () if self._rivals() else self.navigation_map.tracked_objects(self.clock.now())
         for free in paths_beside(start, keep_free, known, p.distance, self.navigation_map.same_storey):

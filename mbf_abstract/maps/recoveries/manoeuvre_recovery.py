@@ -60,7 +60,11 @@ class ManoeuvreRecovery(GuardedRecovery):
             _, curvature = arc_to(pose, tracker.point_at(tracker.progress + LOOKAHEAD))
             return Twist.planar(vx=speed, wz=max(-limit, min(limit, speed * curvature)))
 
-        return self.drive(request, velocity, finished)
+        return self.drive(request, velocity, finished, self._obstacle_on_manoeuvre)
+
+    def _obstacle_on_manoeuvre(self, pose: Pose, command: Twist) -> str:
+        """As for a path: a manoeuvre is searched where the robot touches nothing, and asked for no more."""
+        return self.navigation_map.obstacle_on_path(self.on_map(pose), command, self.parameters.check_ahead_time)
 
     def _turn(self, request: RecoveryRequest, end: Pose) -> RecoveryResult:
         """Turn on the spot to a heading."""
