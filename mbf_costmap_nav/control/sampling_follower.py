@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import replace
+from typing import Any
 
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath, MotionLimits, cannot_turn_ahead
-from mbf_abstract.maps.controllers.standing import StandingParameters
 from mbf_abstract.maps.tracking.avoidance import MovingAround
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_costmap_nav.control.path_handling import ControlCycle, PathFollower
@@ -28,23 +28,15 @@ class SamplingFollower(PathFollower):
     """A controller whose ``sampled`` is one cycle of it."""
 
     leaves_contacts = True
+    parameters: Any  # those of a controller, with ``standing`` and ``moving_objects``
 
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)
         self._keeping = KeepingToPath(context)
 
-    @property
-    @abstractmethod
-    def standing(self) -> StandingParameters:
-        """What it does where its samples get the robot nowhere."""
-
     @abstractmethod
     def limits(self, cycle: ControlCycle) -> MotionLimits:
         """What it may command in this cycle."""
-
-    @abstractmethod
-    def moving_around(self, cycle: ControlCycle) -> MovingAround:
-        """What moves around the robot."""
 
     @abstractmethod
     def sampled(self, cycle: ControlCycle, around: MovingAround) -> ControlResult:
@@ -68,12 +60,13 @@ class SamplingFollower(PathFollower):
         if isinstance(cycle, ControlResult):
             return cycle
         assert self.tracker is not None
-        around = self.moving_around(cycle)
+        p = self.parameters
+        around = MovingAround.on(self.navigation_map, cycle.request.pose, self.clock.now(), p.moving_objects)
         pose = self.transforms.transform_pose(request.pose, self.tracker.path.frame_id)
         return self._keeping.choose(
             replace(request, pose=pose),
             self.limits(cycle),
-            self.standing,
+            p.standing,
             around,
             lambda: self.sampled(cycle, around),
             lambda: self._is_narrow(cycle),

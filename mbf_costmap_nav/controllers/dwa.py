@@ -76,21 +76,11 @@ class DWAController(SamplingFollower):
         p = self.parameters
         self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0)
 
-    @property
-    def standing(self) -> StandingParameters:
-        """As configured."""
-        return self.parameters.standing
-
     def limits(self, cycle: ControlCycle) -> MotionLimits:
         """Those of the window."""
         p, top = self.parameters, cycle.speed_limit
         gains = p.acc_lim_x * p.window_time, p.acc_lim_theta * p.window_time
         return MotionLimits(max(p.min_vel_x, -top), min(p.max_vel_x, top), p.max_vel_theta, False, *gains)
-
-    def moving_around(self, cycle: ControlCycle) -> MovingAround:
-        """What the map tracks now."""
-        objects = self.parameters.moving_objects
-        return MovingAround.on(self.navigation_map, cycle.request.pose, self.clock.now(), objects)
 
     @property
     def turns_on_the_spot(self) -> bool:

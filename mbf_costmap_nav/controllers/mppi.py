@@ -123,21 +123,11 @@ class MPPIController(SamplingFollower):
         self._radius = self.turning_radius
         self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0)
 
-    @property
-    def standing(self) -> StandingParameters:
-        """As configured."""
-        return self.parameters.standing
-
     def limits(self, cycle: ControlCycle) -> MotionLimits:
         """Those of the samples."""
         p, top = self.parameters, cycle.speed_limit
         gains = p.acc_lim_x * p.model_dt, p.acc_lim_theta * p.model_dt
         return MotionLimits(max(p.min_vel_x, -top), min(p.max_vel_x, top), p.max_vel_theta, self._radius > 0.0, *gains)
-
-    def moving_around(self, cycle: ControlCycle) -> MovingAround:
-        """What the map tracks now."""
-        objects = self.parameters.moving_objects
-        return MovingAround.on(self.navigation_map, cycle.request.pose, self.clock.now(), objects)
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path; the nominal sequence is kept while driving, so that a new plan does not jerk."""
