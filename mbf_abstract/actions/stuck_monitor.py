@@ -58,6 +58,8 @@ BLOCKED = frozenset(
 """Failures that another robot in the way causes."""
 NO_PLAN = frozenset([GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_GOAL])
 """Failures that closed places may be to blame for."""
+SAME_KIND: dict[int, int] = {ExePathOutcome.COLLISION: ExePathOutcome.BLOCKED_PATH}
+"""Failures that count as others: whether a blocked robot touches what is in its way may change by a centimetre."""
 NOWHERE = frozenset([ExePathOutcome.OSCILLATION, MoveBaseOutcome.OSCILLATION])
 """Failures of a robot that drives and gets nowhere."""
 
@@ -71,7 +73,7 @@ class TroubleSpot:
     place : Pose
         Where the robot was at the first failure.
     failures : dict of int to list of float
-        Times [s] of the failures of each outcome code.
+        Times [s] of the failures of each outcome code; of those of one kind, ``SAME_KIND``, together.
     tried : dict of str to int
         Behaviours that ran here, with their last outcome, in the order of their first run.
     escalations : int
@@ -131,11 +133,12 @@ class StuckMonitor:
             self._present = None
             return
         self._present = spot = self._spot_at(pose)
-        was_stuck = self._is_too_much(spot.failures.setdefault(outcome, []))
-        spot.failures[outcome].append(self._runtime.clock.now())
+        failures = spot.failures.setdefault(SAME_KIND.get(outcome, outcome), [])
+        was_stuck = self._is_too_much(failures)
+        failures.append(self._runtime.clock.now())
         if outcome in BLOCKED and spot.meetings < MOST_MEETINGS and self._meets_others():
             self._for_meeting = behavior_for_meetings(self._runtime, self._plugins)
-        is_stuck = self._is_too_much(spot.failures[outcome])
+        is_stuck = self._is_too_much(failures)
         self._avoid_or_open(pose, outcome, is_stuck)
         if is_stuck and not was_stuck:
             self._runtime.events.emit(
@@ -143,7 +146,7 @@ class StuckMonitor:
                 "stuck_monitor",
                 place=list(spot.place.position),
                 outcome=int(outcome),
-                failures=len(spot.failures[outcome]),
+                failures=len(failures),
                 tried=list(spot.tried),
                 message=str(spot),
             )

@@ -22,7 +22,7 @@ ESCALATION = ("wait", "back_up", "relax")
 PARAMETERS = {
     "planner_patience": 0.5,
     "controller_max_retries": 3,
-    "stuck_time": 1.0,  # a place counts by kind of failure, and a robot that comes to touch something changes it
+    "stuck_time": 2.0,
     "escalation_behaviors": ESCALATION,
 }
 

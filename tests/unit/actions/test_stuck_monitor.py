@@ -10,7 +10,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.testing.scripted_session import ScriptedSession
 
-BLOCKED, COLLISION = ExePathOutcome.BLOCKED_PATH, ExePathOutcome.COLLISION
+BLOCKED, COLLISION, MISSED = ExePathOutcome.BLOCKED_PATH, ExePathOutcome.COLLISION, ExePathOutcome.MISSED_PATH
 STUCK = ExePathOutcome.ROBOT_STUCK
 LADDER = ("wait", "back_out")
 
@@ -59,8 +59,13 @@ def test_failures_in_quick_succession_are_one_too_many_only_after_a_time(stand):
 
 def test_failures_of_different_kinds_are_counted_apart(stand):
     made = stand()
-    codes = (BLOCKED, COLLISION, BLOCKED, COLLISION, BLOCKED)
+    codes = (BLOCKED, MISSED, BLOCKED, MISSED, BLOCKED)
     assert [made.fail(outcome=code) for code in codes] == [False, False, False, False, True]
+
+
+def test_a_robot_that_comes_to_touch_what_is_in_its_way_is_as_blocked_as_before(stand):
+    made = stand()
+    assert [made.fail(outcome=code) for code in (BLOCKED, COLLISION, BLOCKED)] == [False, False, True]
 
 
 def test_what_the_robot_did_between_two_failures_does_not_matter(stand):
@@ -144,7 +149,7 @@ def test_without_escalation_the_usual_recoveries_go_on(stand):
 
 
 @given(
-    st.lists(st.tuples(st.integers(0, 40), st.sampled_from([BLOCKED, COLLISION])), max_size=30),
+    st.lists(st.tuples(st.integers(0, 40), st.sampled_from([BLOCKED, COLLISION, MISSED])), max_size=30),
     st.integers(0, 4),
     st.integers(0, 12),
     st.sampled_from([0.0, 0.5]),
@@ -162,12 +167,12 @@ def test_it_counts_as_a_naive_counter_does(failures, limit, tenths, wait):
                 place = len(founded)
                 founded.append(x)
             answer = made.fail(x, outcome)
-            history.append((place, outcome, session.clock.now()))
-            for kind in (BLOCKED, COLLISION):
+            history.append((place, MISSED if outcome == MISSED else BLOCKED, session.clock.now()))
+            for kind in (BLOCKED, MISSED):
                 times = [time for *where, time in history if where == [place, kind]]
                 if 0 < limit <= len(times) and times[-1] - times[0] >= wait - 1e-6:
                     stuck.add((place, kind))
-            assert answer == any((place, kind) in stuck for kind in (BLOCKED, COLLISION))
+            assert answer == any((place, kind) in stuck for kind in (BLOCKED, MISSED))
         assert len(session.recorded(EventKind.STUCK)) == len(stuck)
 
 
