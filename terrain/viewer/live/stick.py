@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from mbf_abstract.drive.teleoperation import Teleoperation
+from mbf_abstract.drive.teleoperation import TAKING_OVER, Teleoperation
 from mbf_abstract.geometry import Twist
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.time.clock import Clock
@@ -116,6 +116,8 @@ class Stick:
         """What the robot makes of it."""
         if is_paused:
             return "paused: the stick does nothing until Resume"
+        if not self._drives:  # no step since it was taken: nothing has moved yet
+            return TAKING_OVER
         return self._teleoperation.problem or "driving"
 
     def _command(self, position: Position) -> Twist:

@@ -94,6 +94,21 @@ def test_a_page_that_falls_silent_has_released_the_stick(by_hand):
     assert run.poses[4.0].distance_to(run.poses[5.0]) < 0.01
 
 
+def test_the_page_reads_driving_only_once_the_robot_has_got_a_command(by_hand):
+    run, stick = by_hand
+    read = {}
+    for taken in (2.0, 3.0):  # the second time the first one's answer is still known
+        run.at(taken, lambda: report(run, stick), lambda: read.setdefault("taken", []).append(stick.status(False)))
+        hold(run, stick, taken + 0.1, taken + 0.5)
+        run.at(taken + 0.4, lambda: read.setdefault("later", []).append(stick.status(False)))
+        run.at(taken + 0.5, lambda: stick.release(1))
+    run.at(4.0, lambda: run.controls.end("enough"))
+
+    run.visit_goals()
+
+    assert read == {"taken": ["taking over"] * 2, "later": ["driving"] * 2}
+
+
 def test_the_second_visitor_gets_the_stick_when_the_first_one_has_released_it(by_hand):
     run, stick = by_hand
     answers = []
