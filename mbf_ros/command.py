@@ -87,7 +87,7 @@ def serve(
         if robot_only and app is not None:
             raise ValueError("--foxglove shows a navigator, which --robot-only leaves out")
         if robot_only and _is_navigation(Path(what)):
-            raise ValueError("--robot-only is of scenarios; the robot of a navigation file is a client itself")
+            raise ValueError("--robot-only is for scenarios: the robot of a navigation file is a client itself")
         with waiting("reading the configuration") as on_step:
             session, robot = _open(what, backend or None, seed if seed >= 0 else None, max_silence, on_step)
         served = serve_robot(session, options) if robot_only else serve_session(session, options, robot)
@@ -109,7 +109,7 @@ def _open(
     """A session of a navigation file with a robot that is a client, or of a scenario, simulated."""
     if _is_navigation(Path(what)):
         if backend is not None or seed is not None:
-            raise ValueError("--backend and --seed are of scenarios; a navigation file names its backend itself")
+            raise ValueError("--backend and --seed are for scenarios: a navigation file names its backend itself")
         return _real_robot(Path(what), max_silence)
     worlds = [point for point in entry_points(group=WORLDS_GROUP)]
     if not worlds:

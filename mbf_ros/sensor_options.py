@@ -22,9 +22,9 @@ def sensors_of(texts: Iterable[str]) -> dict[str, tuple[str, str]]:
         name = f"sensor_msgs/{kind}"
         if not topic or not source or name not in SENSORS:
             kinds = ", ".join(one.partition("/")[2] for one in SENSORS)
-            raise ValueError(f"--sensor must be TOPIC:TYPE=SOURCE with one of the types {kinds}, got {text!r}")
+            raise ValueError(f"--sensor: expected TOPIC:TYPE=SOURCE with one of the types {kinds}, got {text!r}")
         if topic.lstrip("/") in {other.lstrip("/") for other in found}:
-            raise ValueError(f"--sensor names the topic {topic} twice; each topic feeds one source")
+            raise ValueError(f"--sensor: expected each topic once, got {topic!r} twice")
         found[topic] = (name, source)
     return found
 

@@ -26,7 +26,7 @@ def outline_problem(corners: FloatArray) -> str:
     if crossing is not None:
         return f"an outline whose sides do not cross, but side {crossing[0]} meets side {crossing[1]}"
     if not area >= LEAST_AREA:
-        return f"an outline with an area of at least {LEAST_AREA:g} m2, not {area:g} m2"
+        return f"an outline with an area of at least {LEAST_AREA:g} m², not {area:g} m²"
     if not _holds_origin(points, ends):
         return "an outline around the base, (0, 0), which lies outside of it"
     return ""

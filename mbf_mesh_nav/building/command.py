@@ -48,7 +48,7 @@ def build(
     clearance: float = typer.Option(1.5, "--clearance", help="Free height that the robot needs [m]."),
     step_height: float = typer.Option(0.2, "--step-height", help="What is driven over, such as grass [m]."),
     hole_width: float = typer.Option(1.0, "--hole-width", help="Holes up to this width are filled [m]; 0 = none."),
-    least_area: float = typer.Option(10.0, "--least-area", help="Smaller separate surfaces are left out [m2]."),
+    least_area: float = typer.Option(10.0, "--least-area", help="Smaller separate surfaces are left out [m²]."),
     decimate: float = typer.Option(
         0.0, "--decimate", help="Fewer vertices, whose faces stay this near to those of all [m]; 0 = all."
     ),

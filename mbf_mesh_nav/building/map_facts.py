@@ -126,14 +126,14 @@ def lines_of(facts: MapFacts) -> list[tuple[str, str]]:
     mesh = f"{facts.vertices} vertices, {facts.faces} faces"
     if facts.faces < facts.faces_before:
         mesh += f" of {facts.faces_before}, {facts.decimation_max:.3f} m from the whole surface at most"
-    thrown = f"{facts.outliers} isolated points, {facts.small_area:.0f} m2 of small surfaces"
+    thrown = f"{facts.outliers} isolated points, {facts.small_area:.0f} m² of small surfaces"
     return [
         ("points", f"{facts.points}, {x:.1f} x {y:.1f} x {z:.1f} m, {unit}"),
-        ("density", f"{facts.density:.0f} points/m2, a vertex every {facts.cell:g} m"),
-        ("surface", f"{facts.area:.0f} m2, of which {facts.stacked_area:.0f} m2 are above others"),
+        ("density", f"{facts.density:.0f} points/m², a vertex every {facts.cell:g} m"),
+        ("surface", f"{facts.area:.0f} m², of which {facts.stacked_area:.0f} m² are above others"),
         ("mesh", mesh),
-        ("holes", f"{facts.filled_area:.1f} m2 filled"),
-        ("obstacles", f"{facts.obstacle_area:.1f} m2"),
+        ("holes", f"{facts.filled_area:.1f} m² filled"),
+        ("obstacles", f"{facts.obstacle_area:.1f} m²"),
         ("left out", thrown),
         ("error", f"{facts.error_rms:.4f} m rms of the points, 95 % below {facts.error_95:.4f} m"),
         (
@@ -141,5 +141,5 @@ def lines_of(facts: MapFacts) -> list[tuple[str, str]]:
             f"{facts.height_error:.4f} m standard error among neighbours, by which layers narrow their limits",
         ),
         ("origin", f"({origin}) of the files is (0, 0, 0) of the map"),
-        ("crs", facts.crs or "unknown"),
+        ("coordinates", facts.crs or "the files state no coordinate system"),
     ]

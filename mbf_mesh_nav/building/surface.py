@@ -60,7 +60,7 @@ class SurfaceParameters(ParameterModel):
     max_slope: float = parameter(70.0, "What is steeper is a wall and no surface.", unit="deg", gt=5.0, le=85.0)
     obstacle_points: int = parameter(2, "Points above a cell that make it an obstacle.", ge=1)
     hole_width: float = parameter(1.0, "Holes up to this width are filled; 0 = none.", unit="m", ge=0.0, le=20.0)
-    least_area: float = parameter(10.0, "Smaller separate surfaces are left out.", unit="m2", ge=0.0)
+    least_area: float = parameter(10.0, "Smaller separate surfaces are left out.", unit="m^2", ge=0.0)
     decimation_bound: float = parameter(
         0.0, "Fewer vertices, whose faces stay this near to those of all; 0 = all vertices.", unit="m", ge=0.0, le=1.0
     )
@@ -150,7 +150,7 @@ def build_surface(
     faces = faces_of_patches(patches.heights, links, ~is_obstacle)
     is_kept = _is_large(patches, faces, chosen.least_area)
     if not is_kept.any():
-        raise MeshError("point cloud", [f"there is no surface of {chosen.least_area:g} m2 in it"])
+        raise MeshError("point cloud", [f"there is no surface of {chosen.least_area:g} m² in it"])
     is_used, is_small = _of_faces(patches, faces[is_kept]), _of_faces(patches, faces[~is_kept])
     faces = faces[is_kept]
     on_step("error")

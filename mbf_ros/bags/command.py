@@ -95,7 +95,7 @@ def recorded_map(
         from mbf_ros.bags.recorded_map import map_topic, read_recorded_map, write_recorded_map
 
         if out.suffix not in (".yaml", ".yml"):
-            raise ValueError(f"--out must be a .yaml file, got {out}")
+            raise typer.BadParameter(f"expected a .yaml file, got {str(out)!r}", param_hint="--out")
         with waiting("reading the bag"), open_bag(bag) as opened:
             message = read_recorded_map(opened, map_topic(opened, topic), at)
             write_recorded_map(out, message)
@@ -141,7 +141,7 @@ def _pairs(texts: list[str]) -> dict[str, str]:
     for text in texts:
         what, equals, topic = text.partition("=")
         if not what or not equals:
-            raise ValueError(f"--topic must be WHAT=TOPIC, got {text!r}")
+            raise typer.BadParameter(f"expected WHAT=TOPIC, got {text!r}", param_hint="--topic")
         pairs[what] = topic
     return pairs
 
@@ -159,7 +159,8 @@ def _transforms(texts: list[str]) -> tuple[Transform, ...]:
             x, y, z, yaw = (float(number) for number in numbers.split(","))
             pose = Pose.planar(x, y, yaw, z)
         except ValueError as error:
-            raise ValueError(f"--tf must be PARENT:CHILD=X,Y,Z,YAW in metres and radians, got {text!r}") from error
+            expected = "PARENT:CHILD=X,Y,Z,YAW in metres and radians"
+            raise typer.BadParameter(f"expected {expected}, got {text!r}", param_hint="--tf") from error
         parent, child = parent.lstrip("/"), child.lstrip("/")
         found.append(Transform(pose.position, pose.orientation, parent, child, static=True))
     return tuple(found)

@@ -40,7 +40,7 @@ class Observation:
 
     def __init__(self, server: MapServer, robot: RecordedRobot, map_name: str, began: float, duration: float) -> None:
         if map_name and map_name not in server.map_views:
-            raise ValueError(f"--map {map_name}: there is no such map, only {', '.join(server.map_views)}")
+            raise ValueError(f"--map: expected one of {', '.join(server.map_views)}, got {map_name!r}")
         self._server, self._robot, self._map_name, self._began = server, robot, map_name, began
         served = server.served.get(map_name) or next(iter(server.served.values()))
         self.frame_id: str = served.map.frame_id
@@ -86,7 +86,7 @@ class Observation:
         costs = 0 if view is None else view.costs.size
         if costs * count > MOST_COSTS:
             most = MOST_COSTS // costs
-            raise ValueError(f"--every: {count} pictures of a map of {costs} costs are too many, at most {most}")
+            raise ValueError(f"--every: expected at most {most} pictures of a map of {costs} costs, got {count}")
 
     def look_at_map(self, now: float) -> None:
         """Keep what the map looks like."""

@@ -38,10 +38,11 @@ def map_topic(bag: Bag, chosen: str) -> str:
     listed = ", ".join(maps) or "none"
     if chosen:
         if chosen not in maps:
-            raise BagError(f"{bag.path}: --topic {chosen}: expected a topic of {MAP_TYPE}: {listed}")
+            raise BagError(f"{bag.path}: --topic: expected a topic of the type {MAP_TYPE} ({listed}), got {chosen!r}")
         return chosen
     if len(maps) != 1 and len(named) != 1:
-        raise BagError(f"{bag.path}: expected one topic of {MAP_TYPE}, found {listed}; choose by --topic")
+        advice = "; choose by --topic" if maps else ""
+        raise BagError(f"{bag.path}: expected one topic of the type {MAP_TYPE}, got {listed}{advice}")
     return maps[0] if len(maps) == 1 else named[0]
 
 
@@ -65,7 +66,7 @@ def read_recorded_map(bag: Bag, topic: str, at: float) -> Message:
             last = recorded
     if last is None:
         when = f" in the first {at:g} s" if math.isfinite(at) else ""
-        raise BagError(f"{bag.path}: no map on {topic}{when}")
+        raise BagError(f"{bag.path}: expected a map on {topic}{when}, got none")
     try:
         return bag.decode(last)
     except MessageError as error:
@@ -83,11 +84,11 @@ def write_recorded_map(file: Path, message: Message) -> None:
     """
     image = file.with_suffix(".pgm")
     if there := [one for one in (file, image) if one.exists()]:
-        raise BagError(f"{there[0]}: expected a file that does not exist yet")
+        raise BagError(f"{there[0]}: expected a file that does not exist yet, got one that exists")
     try:
         floor = floor_of(message, MessageContext())
     except MessageError as error:
-        raise BagError(f"the map means nothing: {error}") from error
+        raise BagError(f"the recorded map: {error}") from error
     height, width = floor.occupancy.shape
     rows = floor.occupancy[::-1]
     file.parent.mkdir(parents=True, exist_ok=True)

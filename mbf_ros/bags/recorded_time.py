@@ -112,7 +112,7 @@ def _date(time: int) -> str:
 def check_seconds(option: str, seconds: float) -> None:
     """Raise ValueError for an option in seconds that is negative or NaN."""
     if not seconds >= 0.0:
-        raise ValueError(f"{option} must be 0 s or more, got {seconds}")
+        raise ValueError(f"{option}: expected 0 s or more, got {seconds}")
 
 
 def first_stamp(message: Message) -> dict[str, Any] | None:

@@ -118,12 +118,12 @@ class _Player:
         if options.goal is not None:
             self._plan = ReplayedPlan(session.navigator, options.goal, options.planner, observation.frame_id)
         if options.at > time.duration and math.isfinite(options.at):
-            raise ValueError(f"--at {options.at:g}: the bag ends after {time.duration:.3f} s")
+            raise ValueError(f"--at: expected at most {time.duration:.3f} s, where the bag ends, got {options.at:g} s")
         self._plan_at = time.began + options.at
         self._every = options.every or max(time.duration / PICTURES, SAMPLE_PERIOD)
         count = math.ceil(time.duration / self._every) + 1
         if count > MOST_PICTURES:
-            raise ValueError(f"--every {self._every:g}: would make {count} pictures, allowed are {MOST_PICTURES}")
+            raise ValueError(f"--every {self._every:g}: expected at most {MOST_PICTURES} pictures, got {count}")
         observation.check_pictures(count)
         self._samples = self._pictures = 0
         self._is_planned = False
@@ -185,10 +185,10 @@ def _check_transforms(bag: Bag, topics: BagTopics, options: ReplayOptions) -> No
     """Raise BagError where nothing says where the robot is."""
     odometry = options.odometry_as_transform
     if odometry and not topics.odometry:
-        raise BagError(f"{bag.path}: --odom-tf needs odometry (nav_msgs/Odometry), and there is none")
+        raise BagError(f"{bag.path}: --odom-tf: expected odometry (nav_msgs/Odometry), got none")
     if not (topics.transforms or topics.static or options.transforms or odometry):
         raise BagError(
-            f"{bag.path}: expected transforms (tf2_msgs/TFMessage), found none; --odom-tf takes the poses of odometry, "
+            f"{bag.path}: expected transforms (tf2_msgs/TFMessage), got none; --odom-tf takes the poses of odometry, "
             "--tf PARENT:CHILD=X,Y,Z,YAW gives one that does not change"
         )
 

@@ -117,7 +117,7 @@ def _topic(what: str, fitting: Sequence[str], types: Mapping[str, str], chosen: 
     if topic and types.get(topic) not in allowed:
         found = f"of type {types[topic]}" if topic in types else "not in the bag"
         candidates = ", ".join(sorted(one for one, kind in types.items() if kind in allowed)) or "none"
-        raise BagError(f"--topic {what}={topic}: the topic is {found}; topics that may be {what!r}: {candidates}")
+        raise BagError(f"--topic {what}={topic}: expected one of the topics {candidates}, got one {found}")
     return topic
 
 

@@ -102,7 +102,7 @@ def _writer(folder: Path) -> Iterator[tuple[Any, Any]]:
     except ImportError as error:
         raise RuntimeError(f"{NEEDS} ({error})") from error
     if folder.exists():
-        raise BagError(f"{folder}: expected a folder that does not exist yet")
+        raise BagError(f"{folder}: expected a folder that does not exist yet, got one that exists")
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent) as part:

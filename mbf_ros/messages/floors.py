@@ -42,5 +42,5 @@ def _occupancy(data: Any, width: int, height: int) -> NDArray[np.uint8]:
     """Cells (height, width): -1 is unknown, and what is below that or above 100 occupied, as Nav2 takes them."""
     cells = np.asarray(data, dtype=np.int8)
     if not cells.size or width * height != cells.size:
-        raise InvalidValueError(f"the data has {cells.size} cells, its size is {width} x {height}")
+        raise InvalidValueError(f"data: expected {width} x {height} cells, at least one, got {cells.size}")
     return cells.view(np.uint8).reshape(height, width)

@@ -48,7 +48,7 @@ def path_question(request: Message, context: MessageContext) -> dict[str, Any]:
     """Return the arguments of ``MapQueries.check_path`` for a CheckPath_Request."""
     state = request["return_on"]
     if state not in tuple(CellState):
-        raise MessageError(f"return_on must be a state from 0 to {max(CellState)}, got {state}")
+        raise MessageError(f"return_on: expected a state from 0 to {max(CellState)}, got {state}")
     return {
         "path": path_of(request["path"], context),
         "query": _place_query(request),
@@ -75,7 +75,7 @@ def valid_pose_answer(answer: PoseAnswer, context: MessageContext) -> Message:
 
 def _is_local(request: Message) -> bool:
     if request["costmap"] not in (LOCAL_COSTMAP, GLOBAL_COSTMAP):
-        raise MessageError(f"costmap must be 1 (local) or 2 (global), got {request['costmap']}")
+        raise MessageError(f"costmap: expected 1 (local) or 2 (global), got {request['costmap']}")
     return bool(request["costmap"] == LOCAL_COSTMAP)
 
 
@@ -86,7 +86,7 @@ def _pose(request: Message, context: MessageContext) -> Pose | None:
 def _place_query(request: Message) -> PlaceQuery:
     factors = {name: request.get(name) or 1.0 for name in FACTORS}
     if bad := [name for name, factor in factors.items() if not math.isfinite(factor)]:
-        raise InvalidValueError(f"{bad[0]} must be finite")
+        raise InvalidValueError(f"{bad[0]}: expected a finite number, got {factors[bad[0]]}")
     try:
         return PlaceQuery(
             request["safety_dist"], local=_is_local(request), use_padded_footprint=request["use_padded_fp"], **factors

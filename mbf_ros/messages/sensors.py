@@ -33,8 +33,7 @@ def laser_scan_of(message: Message, context: MessageContext, source: str, receiv
         An angle or a limit is not finite.
     """
     farthest, nearest, step = message["range_max"], message["range_min"], message["angle_increment"]
-    if not all(map(math.isfinite, (farthest, nearest, step, message["angle_min"]))):
-        raise InvalidValueError("angle_min, angle_increment, range_min and range_max of a scan must be finite")
+    _refuse_infinite(message, "angle_min", "angle_increment", "range_min", "range_max")
     ranges = np.asarray(message["ranges"], dtype=np.float64)
     nothing = ranges == np.inf
     measured = (ranges >= nearest) & (ranges <= farthest)
@@ -50,8 +49,7 @@ def range_of(message: Message, context: MessageContext, source: str, received: f
     A fixed distance ranger (``min_range`` = ``max_range``) says -infinity for something and infinity for nothing.
     """
     farthest, measured, opening = message["max_range"], message["range"], message["field_of_view"]
-    if not (math.isfinite(farthest) and math.isfinite(opening)):
-        raise InvalidValueError("field_of_view and max_range of a range must be finite")
+    _refuse_infinite(message, "field_of_view", "max_range")
     if measured == -math.inf:
         measured = farthest
     hit = message["min_range"] <= measured <= farthest
@@ -71,19 +69,26 @@ def point_cloud_of(message: Message, context: MessageContext, source: str, recei
         It has no fields x, y and z, or less data than its size says.
     """
     fields = {field["name"]: field for field in message["fields"]}
-    if missing := [axis for axis in AXES if axis not in fields]:
-        raise InvalidValueError(f"the cloud has no field {missing[0]!r}, only {', '.join(fields) or 'none'}")
+    if not fields.keys() >= {*AXES}:
+        raise InvalidValueError(f"fields: expected x, y and z, got {', '.join(fields) or 'none'}")
     columns = [_column(message, fields[axis]) for axis in AXES]
     points = np.stack(columns, axis=1)
     points = points[np.isfinite(points).all(axis=1)]
     return _scan(message, context, source, received, points, np.ones(len(points), np.bool_))
 
 
+def _refuse_infinite(message: Message, *names: str) -> None:
+    for name in names:
+        if not math.isfinite(message[name]):
+            raise InvalidValueError(f"{name}: expected a finite number, got {message[name]}")
+
+
 def _column(message: Message, field: Message) -> FloatArray:
     """One coordinate of all points, out of the bytes of a cloud."""
     kind = DATATYPES.get(field["datatype"])
     if kind is None:
-        raise InvalidValueError(f"the datatype {field['datatype']} of the field {field['name']!r} is not known")
+        known = f"one of {', '.join(map(str, DATATYPES))}"
+        raise InvalidValueError(f"fields: datatype of {field['name']!r}: expected {known}, got {field['datatype']}")
     width, height, step, data = message["width"], message["height"], message["point_step"], message["data"]
     dtype = np.dtype((">" if message["is_bigendian"] else "<") + kind)
     row_step = message["row_step"] or width * step

@@ -111,7 +111,7 @@ class RobotNavigation(ABC):
         )
         server = self.session.serve(server_class, config, self._robot, self._transforms)
         self._closing.callback(commands.wait_until_sent, time_to_send)
-        self._closing.callback(server.runtime.gate.close, f"the {self.name} ends")
+        self._closing.callback(server.runtime.gate.close, f"the {self.name} is shutting down")
 
     def _begin(self) -> None:
         """Watch the robot, and get ready for goals."""
@@ -153,7 +153,7 @@ class RobotNavigation(ABC):
     def _refusal(self) -> str:
         """Why no goals are taken; empty if they are."""
         if self._ending.is_set():
-            return f"the {self.name} ends"
+            return f"the {self.name} is shutting down"
         return "" if self._ready.is_set() else f"the {self.name} is not ready: {self.problem()}"
 
     def _look(self) -> None:
@@ -183,7 +183,7 @@ class RobotNavigation(ABC):
     def _stop_serving(self) -> None:
         """Take no more goals, end those that run, and let their results be sent."""
         self._ending.set()
-        server, reason = self.session.navigator.server, f"the {self.name} ends"
+        server, reason = self.session.navigator.server, f"the {self.name} is shutting down"
         server.runtime.gate.close(reason)
         server.cancel_all(reason)
         deadline = self._real_time.now() + self._time_to_end

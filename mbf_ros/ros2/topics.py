@@ -81,7 +81,7 @@ class Inputs:
             except MissingInterfaceError as error:
                 if not one.optional:
                     raise
-                self._node.get_logger().info(f"{one.topic} is not taken: {error}")
+                self._node.get_logger().info(f"{one.topic} is not subscribed to: {error}")
                 continue
             self._node.create_subscription(kind, one.topic, self._taking(one), profile(one.quality, one.depth))
 

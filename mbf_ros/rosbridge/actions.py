@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
+from mbf_abstract.config.findings import describe_value
 from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.goals.result_types import ActionResult
@@ -103,7 +104,7 @@ class ActionTable:
             raise OperationError(f"there is no action {name!r}")
         package, _, short = action.mapping.type.partition("/action/")
         if type_name not in ("", action.mapping.type, f"{package}/{short}"):
-            raise OperationError(f"{name} has the type {action.mapping.type}, not {type_name}")
+            raise OperationError(f"the action {name!r}: expected the type {action.mapping.type}, got {type_name}")
         free_id(client, goal_id)
         return action, action.mapping.goal(values, self._context)
 
@@ -147,7 +148,9 @@ class ActionTable:
 def free_id(client: Client, goal_id: str | None) -> str:
     """Return the id of a new goal; raises OperationError where it is missing or used, or the client has too many."""
     if goal_id is None or goal_id in client.goals:
-        raise OperationError(f"send_action_goal: an id is needed that no unfinished goal has, got {goal_id!r}")
+        raise OperationError(
+            f"send_action_goal: id: expected one that no unfinished goal has, got {describe_value(goal_id)}"
+        )
     if len(client.goals) >= MAX_GOALS:
         raise OperationError(f"{MAX_GOALS} goals of this client are unfinished already")
     return goal_id

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from mbf_abstract.config.findings import describe_value
 from mbf_ros.messages.json_text import json_text
 
 Operation = Mapping[str, Any]
@@ -21,7 +22,7 @@ class OperationError(Exception):
 def parsed(frame: str | bytes) -> Operation:
     """Return the operation in a frame; raises OperationError where it is none."""
     if isinstance(frame, bytes):
-        raise OperationError("this server takes JSON in text frames, got a binary one")
+        raise OperationError("expected JSON in a text frame, got a binary frame")
     try:
         found = json.loads(frame)
     except (ValueError, RecursionError) as error:
@@ -35,7 +36,8 @@ def text_in(operation: Operation, name: str, default: str | None = None) -> str:
     """Return a text of an operation; raises OperationError where it is missing without a default, no text or long."""
     value = operation.get(name, default)
     if not isinstance(value, str) or len(value) > MAX_NAME:
-        raise OperationError(f"{operation['op']}: {name!r} must be a text of at most {MAX_NAME} characters")
+        expected = f"expected a text of at most {MAX_NAME} characters, got {describe_value(value)}"
+        raise OperationError(f"{operation['op']}: {name}: {expected}")
     return value
 
 
@@ -53,7 +55,8 @@ def number_in(operation: Operation, name: str, most: int) -> int:
     """Return a whole number from 0 to ``most``, which also stands for larger ones; 0 where it is missing."""
     value = operation.get(name) or 0
     if isinstance(value, bool) or not isinstance(value, int | float) or not value >= 0:
-        raise OperationError(f"{operation['op']}: {name!r} must be a number of 0 or more")
+        expected = f"expected a number of 0 or more, got {describe_value(value)}"
+        raise OperationError(f"{operation['op']}: {name}: {expected}")
     return int(min(value, most))
 
 

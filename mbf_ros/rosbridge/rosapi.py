@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
+from mbf_abstract.config.findings import describe_value
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message, MessageError, fields_of, full_name, known_types
 from mbf_ros.rosbridge.bridge import Bridge
@@ -92,7 +93,7 @@ def _text(request: Message, name: str) -> str:
     """A text of a request; raises MessageError where it is missing or none."""
     value = request.get(name)
     if not isinstance(value, str):
-        raise MessageError(f"the field {name!r} must be a text, got {value!r}")
+        raise MessageError(f"{name}: expected a text, got {describe_value(value)}")
     return value
 
 

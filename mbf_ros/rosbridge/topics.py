@@ -146,7 +146,7 @@ class TopicTable:
             if topic.on_message is not None:
                 topic.on_message(message)
         except MessageError as error:
-            raise OperationError(f"publish to {name}: {error}") from error
+            raise OperationError(f"publish: {name}: {error}") from error
         if topic.subscriptions or topic.keeps_last:
             self.send(name, frame("publish", topic=name, msg=message))
 
@@ -185,7 +185,7 @@ class TopicTable:
                 raise OperationError(f"the topic {name!r} is not known, so its type must be given")
             self._topics[name] = Topic(wanted)
         if self._topics[name].type != wanted:
-            raise OperationError(f"{name} has the type {self._topics[name].type}, not {wanted}")
+            raise OperationError(f"the topic {name!r}: expected the type {self._topics[name].type}, got {wanted}")
         return self._topics[name]
 
     def _drop_unused(self, name: str) -> None:

@@ -54,7 +54,7 @@ def operation_of(frame: str | bytes, decode_cbor: Callable[[bytes], Any]) -> Ope
         found = json.loads(frame) if isinstance(frame, str) else decode_cbor(frame)
     except Exception as error:  # the decoders raise many kinds
         kind = "JSON" if isinstance(frame, str) else "CBOR"
-        raise OperationError(f"a frame that is no {kind}: {error}") from error
+        raise OperationError(f"expected a frame of {kind}: {error}") from error
     if not isinstance(found, dict) or not isinstance(found.get("op"), str):
-        raise OperationError('a frame without a text "op"')
+        raise OperationError('expected an object with a text "op"')
     return found

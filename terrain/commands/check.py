@@ -48,9 +48,10 @@ def _check_scenario(document: YamlDocument, load: bool) -> Checked:
     scenario = report.scenario
     views = robot_scenarios(scenario).values()
     backends = dict.fromkeys(backend for view in views for backend in view.navigation)
-    robots = f"{len(views)} robots, " if scenario.robots else ""
+    robots = f", {len(views)} robots" if scenario.robots else ""
     goals = sum(len(view.goals) for view in views)
-    summary = f"world {scenario.world.type}, backends {', '.join(backends)}, {robots}{goals} goals"
+    plural = "" if goals == 1 else "s"
+    summary = f"world {scenario.world.type}, backends {', '.join(backends)}{robots}, {goals} goal{plural}"
     return Checked(summary, report.notes)
 
 
@@ -74,4 +75,4 @@ def _check_with_stand_in_robot(file: Path) -> Checked:
     findings = check_on_level_ground(file)
     if findings:
         raise ConfigError(findings)
-    return Checked("good for a Husky", ("a Husky on level ground stands in for the robot and world of a scenario",))
+    return Checked("checked for a Husky", ("a Husky on level ground stands in for the robot and world of a scenario",))

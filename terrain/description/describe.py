@@ -156,9 +156,7 @@ class _Describer:
         limits = self._limits("velocity", [self.urdf.joints[wheel.joint].velocity for wheel in self.gear.driven])
         if limits and radius > 0.0:
             return min(limits) * radius
-        cause = (
-            "the wheels have no limit of velocity" if self.gear.wheels else "joints do not say how fast legs carry it"
-        )
+        cause = "the wheels have no velocity limit" if self.gear.wheels else "joints do not say how fast legs carry it"
         self.notes.append(f"max_speed: {USUAL_SPEED:g} m/s is assumed, because {cause}")
         return USUAL_SPEED
 
@@ -213,7 +211,7 @@ class _Describer:
     def _tipping(self, centre: tuple[float, float, float]) -> Tipping | None:
         found = tipping(self._contacts(), centre)
         if found is None:
-            self.notes.append("it stands on one line: it has to balance, and its slopes are not known")
+            self.notes.append("it stands on one line: it has to balance, and on which slopes it tips over is not known")
         elif found.least <= 0.0:
             self.notes.append("its centre of mass is not above its wheels and casters: it tips over on level ground")
         return found

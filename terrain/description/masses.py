@@ -93,7 +93,7 @@ def notes_on_masses(urdf: Urdf, frames: Mapping[str, FloatArray]) -> list[str]:
         if not is_possible_inertia(link.inertial):
             odd.setdefault("moments of inertia that no body has", []).append(where)
         elif size > 0.0 and radius > size:
-            text = "the inertia of a much larger body than its shape (is its unit kg m2?)"
+            text = "the inertia of a much larger body than its shape (is its unit kg m²?)"
             odd.setdefault(text, []).append(f"{where[:-1]}: {2.0 * radius:.2g} m, its shape {size:.2g} m)")
         elif radius == 0.0:
             odd.setdefault("no inertia, so it counts as a point", []).append(where)

@@ -142,12 +142,12 @@ class _Reader:
         if not links:
             self.refuse(root, "", "at least one <link>", "none")
         elif len(bases) != 1:
-            got = ", ".join(map(repr, bases)) or "a circle of joints"
+            got = ", ".join(map(repr, bases)) or "a cycle of joints"
             self.refuse(root, "", "one link that is not the child of a joint", got)
         elif not self.findings:
             hanging = subtree(Urdf(self.file, "", links, joints, bases[0]), bases[0])
             for name in links.keys() - set(hanging):
-                self.refuse(root, f"link {name}", f"a chain of joints to {bases[0]!r}", "a circle of joints")
+                self.refuse(root, f"link {name}", f"a chain of joints to {bases[0]!r}", "a cycle of joints")
         return bases[0] if bases else ""
 
     def _end(self, element: Element, tag: str, key: str) -> str:
@@ -190,7 +190,7 @@ class _Reader:
         values = [self.numbers(inertia, name, 1, key) if inertia and name in named else None for name in MOMENTS]
         ixx, iyy, izz, ixy, ixz, iyz = (0.0 if value is None else value[0] for value in values)
         if inertia is not None and min(ixx, iyy, izz) < 0.0:
-            self.refuse(inertia, f"{key}: inertia", "moments ixx, iyy, izz >= 0 kg m2", f"{min(ixx, iyy, izz):g}")
+            self.refuse(inertia, f"{key}: inertia", "moments ixx, iyy, izz >= 0 kg m²", f"{min(ixx, iyy, izz):g}")
         transform = self._origin(element, f"{key}: inertial")
         return Inertial(0.0 if read is None else read[0], transform, (ixx, iyy, izz, ixy, ixz, iyz), element.line)
 

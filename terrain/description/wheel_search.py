@@ -196,7 +196,9 @@ def _guess(urdf: Urdf, wheels: list[Wheel]) -> tuple[DriveName, str]:
         bending = [joint for joint in urdf.joints.values() if joint.kind in ("revolute", "continuous")]
         if len(bending) >= MANY_JOINTS:
             return "legged", f"no wheels, {len(bending)} joints that bend"
-        expected = "wheels: endless joints with a level axis and a round collision shape; else wheels: or drive: legged"
+        expected = (
+            "wheels: continuous joints with a level axis and a round collision shape; else wheels: or drive: legged"
+        )
         raise ConfigError([Finding(str(urdf.file), 1, "drive", expected, "none")])
     if steered and not straight:
         return "omni", f"all {len(steered)} wheels are steered"

@@ -57,7 +57,7 @@ def wheel_targets(spec: RobotSpec, command: Command) -> WheelTargets:
     if spec.drive is Drive.ACKERMANN:
         return _car_targets(spec, command)
     if isinstance(command, AckermannCommand):
-        raise TypeError(f"the {spec.name} has no steering, it takes a Twist")
+        raise TypeError(f"{spec.name} cannot steer: expected a Twist, got an AckermannCommand")
     speed = _clip(command.vx, spec.max_speed)
     yaw_rate = _clip(command.wz, spec.max_yaw_rate)
     half = 0.5 * yaw_rate * spec.track * spec.track_multiplier

@@ -113,7 +113,7 @@ class WheeledRobot:
             An ``AckermannCommand`` for a robot that cannot steer.
         """
         if isinstance(command, AckermannCommand) and self.spec.drive is not Drive.ACKERMANN:
-            raise TypeError(f"the {self.spec.name} has no steering, it takes a Twist")
+            raise TypeError(f"{self.spec.name} cannot steer: expected a Twist, got an AckermannCommand")
         self._command, self._command_stamp = command, self.world.time
 
     def settle(self, seconds: float = SETTLING_TIME) -> None:

@@ -99,12 +99,14 @@ def read_provenance(folder: Path) -> Provenance:
     file = folder / FILE
     if not file.is_file():
         expected = f"the folder of a run, with {FILE}"
-        raise ConfigError([Finding(str(folder), 1, "", expected, "none" if folder.is_dir() else "no folder")])
+        raise ConfigError(
+            [Finding(str(folder), 1, "", expected, "a folder without it" if folder.is_dir() else "no such folder")]
+        )
     document, findings = load_yaml(file), list[Finding]()
     provenance = validate(Provenance, document.data, document, (), findings)
     for name in () if provenance is None else provenance.files:
         if Path(name).is_absolute() or ".." in Path(name).parts:
-            findings.append(document.finding(("files", name), "a path inside of the folder", repr(name)))
+            findings.append(document.finding(("files", name), "a path inside the folder", repr(name)))
     if provenance is None or findings:
         raise ConfigError(findings)
     return provenance

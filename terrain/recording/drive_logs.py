@@ -58,7 +58,9 @@ def read_drive_log(folder: Path) -> DriveLog:
     names = robots_of(folder)
     if names != [""]:
         known = ", ".join(str(folder / name) for name in names)
-        raise RecordingError(f"{folder}: holds several robots, expected the folder of one of them: {known}")
+        raise RecordingError(
+            f"{folder}: expected the folder of one robot, got that of {len(names)}; name one of {known}"
+        )
     return drive_log_of(read_run(folder)[0])
 
 

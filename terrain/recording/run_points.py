@@ -22,13 +22,13 @@ def read_run_points(folder: Path, max_points: int) -> FloatArray:
     """
     file = folder / "recording.npz"
     if not file.exists():
-        raise RecordingError(f"expected the folder of a run, there is no {file.name} in it")
+        raise RecordingError(f"{folder}: expected the folder of a run, with {file.name}, got one without it")
     try:
         arrays = read_arrays(file, BYTES_A_POINT * max_points, (SCANS,))
     except (OSError, ArrayFileError) as error:
         raise RecordingError(f"{file}: is not a readable recording: {error}") from error
     if SCANS not in arrays or arrays[SCANS].ndim != 2 or arrays[SCANS].shape[1] != 3:
-        raise RecordingError(f"{file}: is no recording of a run")
+        raise RecordingError(f"{file}: expected the recording of a run, got one without scans (n, 3)")
     if not len(arrays[SCANS]):
-        raise RecordingError(f"{file}: no range sensor hit anything in this run")
+        raise RecordingError(f"{file}: expected hits of range sensors, got none in this run")
     return arrays[SCANS]

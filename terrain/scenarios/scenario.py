@@ -145,7 +145,7 @@ def _find_contradictions(scenario: Scenario, document: YamlDocument) -> list[Fin
     if scenario.physics == "kinematic" and isinstance(scenario.world, LevelsWorld):
         findings.append(document.finding(("physics",), "bullet, for a world with several levels", scenario.physics))
     if scenario.map.spacing is not None and not isinstance(scenario.world, TerrainWorld):
-        expected = f"no spacing, which only maps of open ground have (a world of type {scenario.world.type} has none)"
+        expected = f"nothing in a world of type {scenario.world.type}: only maps of open ground have a spacing"
         findings.append(document.finding(("map", "spacing"), expected, f"{scenario.map.spacing:g}"))
     return list(dict.fromkeys(findings))
 
@@ -220,7 +220,11 @@ def copy_scenario(name: str, folder: Path) -> list[Path]:
     data = load_yaml(known[name]).data
     files = [file for block in (data, *data.get("robots", ())) for file in block.get("navigation", {}).values()]
     copies = {folder / known[name].name: known[name]} | {folder / file: LIBRARY / file for file in files}
-    there = [Finding(str(copy), 1, "", "no file, because a copy comes here", "one") for copy in copies if copy.exists()]
+    there = [
+        Finding(str(copy), 1, "", "a file that does not exist yet", "one that exists")
+        for copy in copies
+        if copy.exists()
+    ]
     if there:
         raise ConfigError(there)
     for copy, source in copies.items():

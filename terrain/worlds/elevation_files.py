@@ -129,12 +129,18 @@ def read_elevation(path: str | Path, max_samples: int = MAX_SAMPLES) -> Elevatio
         Missing file, unknown ending, too many samples, or contents that do not match the ending.
     """
     path = Path(path)
-    readers = {".asc": _read_esri_ascii, ".hgt": _read_hgt, ".tif": _read_geotiff, ".tiff": _read_geotiff}
-    reader = (readers | {".npz": _read_npz}).get(path.suffix.lower())
+    readers = {
+        ".asc": _read_esri_ascii,
+        ".hgt": _read_hgt,
+        ".tif": _read_geotiff,
+        ".tiff": _read_geotiff,
+        ".npz": _read_npz,
+    }
+    reader = readers.get(path.suffix.lower())
     if reader is None:
-        raise TerrainFileError(path, f"unknown ending '{path.suffix}', expected .asc, .hgt, .tif or .npz")
+        raise TerrainFileError(path, f"unknown ending '{path.suffix}', known are: {', '.join(sorted(readers))}")
     if not path.is_file():
-        raise TerrainFileError(path, "no such file")
+        raise TerrainFileError(path, "there is no such file")
     try:
         return reader(path, max_samples)
     except TerrainFileError:
@@ -165,9 +171,9 @@ def _filled(elevation: Elevation) -> Heightfield:
 
 def _refuse_size(path: Path, rows: int, columns: int, max_samples: int) -> None:
     if min(rows, columns) < 2:
-        raise TerrainFileError(path, f"unusable size of {rows} rows x {columns} columns")
+        raise TerrainFileError(path, f"expected at least 2 x 2 heights, got {rows} x {columns}")
     if rows * columns > max_samples:
-        raise TerrainFileError(path, f"{rows} rows x {columns} columns of heights, the limit is {max_samples} in all")
+        raise TerrainFileError(path, f"{rows} x {columns} heights, the limit is {max_samples}")
 
 
 def _read_esri_ascii(path: Path, max_samples: int) -> Elevation:
@@ -180,14 +186,16 @@ def _read_esri_ascii(path: Path, max_samples: int) -> Elevation:
             header[fields[0].lower()] = float(fields[1])
     missing = [key for key in ("ncols", "nrows", "cellsize") if key not in header]
     if missing:
-        raise TerrainFileError(path, f"header without {', '.join(missing)}")
+        raise TerrainFileError(path, f"expected {', '.join(missing)} in the header, got none")
     shape = int(header["nrows"]), int(header["ncols"])
     _refuse_size(path, *shape, max_samples)
     if path.stat().st_size > MAX_ASCII_BYTES_PER_SAMPLE * (shape[0] * shape[1] + len(header)):
-        raise TerrainFileError(path, f"{path.stat().st_size} bytes are too many for {shape[0]} x {shape[1]} heights")
+        raise TerrainFileError(
+            path, f"expected {shape[0]} x {shape[1]} heights, got {path.stat().st_size} bytes of text"
+        )
     values = np.array(path.read_text(encoding="ascii").split()[2 * len(header) :], dtype=np.float64)
     if values.size != shape[0] * shape[1]:
-        raise TerrainFileError(path, f"{values.size} heights, the header promises {shape[0]} x {shape[1]}")
+        raise TerrainFileError(path, f"expected {shape[0]} x {shape[1]} heights as in the header, got {values.size}")
     void = header.get("nodata_value", ASCII_VOID)
     return _northern_row_first(values.reshape(shape), header["cellsize"], header["cellsize"], void)
 
@@ -196,11 +204,13 @@ def _read_hgt(path: Path, max_samples: int) -> Elevation:
     """SRTM: one degree square of big-endian int16; the name holds the south-west corner, e.g. ``N44W072``."""
     name = re.match(r"([NS])(\d{2})[EW]\d{3}", path.stem, re.IGNORECASE)
     if name is None:
-        raise TerrainFileError(path, "the name of an SRTM tile must start with its corner, such as N44W072")
+        raise TerrainFileError(
+            path, f"expected a name that starts with the corner of the SRTM tile, such as N44W072, got {path.stem!r}"
+        )
     size = path.stat().st_size
     side = math.isqrt(size // 2)
     if side < 2 or 2 * side * side != size:
-        raise TerrainFileError(path, f"{size} bytes are not a square of 16-bit heights")
+        raise TerrainFileError(path, f"expected a square of 16-bit heights, got {size} bytes")
     _refuse_size(path, side, side, max_samples)
     values = np.fromfile(path, dtype=">i2")
     latitude = (1.0 if name[1].upper() == "N" else -1.0) * float(name[2]) + 0.5
@@ -221,9 +231,9 @@ def _read_geotiff(path: Path, max_samples: int) -> Elevation:
         except (Image.DecompressionBombError, Image.DecompressionBombWarning, SyntaxError) as error:
             raise TerrainFileError(path, f"cannot be read: {error}") from error
     if raster.ndim != 2:
-        raise TerrainFileError(path, f"has {raster.shape[-1]} bands, expected one band of heights")
+        raise TerrainFileError(path, f"expected one band of heights, got {raster.shape[-1]}")
     if TIFF_PIXEL_SCALE not in tags:
-        raise TerrainFileError(path, "has no pixel scale (tag 33550), so it is not a GeoTIFF with square axes")
+        raise TerrainFileError(path, "expected a GeoTIFF with a pixel scale (tag 33550), got none")
     dx, dy = float(tags[TIFF_PIXEL_SCALE][0]), float(tags[TIFF_PIXEL_SCALE][1])
     keys = tags.get(TIFF_GEO_KEYS, ())
     model_types = [keys[i + 3] for i in range(4, len(keys) - 3, 4) if keys[i] == GEO_KEY_MODEL_TYPE]
@@ -238,8 +248,8 @@ def _read_npz(path: Path, max_samples: int) -> Elevation:
     keys = ("z", "dx", "dy")
     data = read_arrays(path, 8 * (max_samples + 2), keys)
     if missing := [key for key in keys if key not in data]:
-        raise TerrainFileError(path, f"lacks {', '.join(missing)}")
+        raise TerrainFileError(path, f"expected the arrays {', '.join(keys)}, got no {', no '.join(missing)}")
     if data["z"].ndim != 2:
-        raise TerrainFileError(path, f"z has the shape {data['z'].shape}, expected rows and columns")
+        raise TerrainFileError(path, f"z: expected rows and columns, got the shape {data['z'].shape}")
     _refuse_size(path, len(data["z"]), data["z"].shape[1], max_samples)
     return _northern_row_first(data["z"], float(data["dx"]), float(data["dy"]))

@@ -113,8 +113,10 @@ def read_floor_plan(path: str | Path = OFFICE_PLAN) -> FloorPlan:
             pillars=tuple((*pillar["at"], pillar["radius"]) for pillar in document.get("pillars", ())),
             places={name: tuple(place) for name, place in document.get("places", {}).items()},
         )
-    except (KeyError, TypeError, ValueError) as error:
-        raise FloorPlanError(f"{path}: {type(error).__name__} {error}") from error
+    except KeyError as error:
+        raise FloorPlanError(f"{path}: expected the key {error}, got none") from error
+    except (TypeError, ValueError) as error:
+        raise FloorPlanError(f"{path}: {error}") from error
 
 
 def _sides(room: dict[str, Any], half: float) -> dict[str, Rectangle]:

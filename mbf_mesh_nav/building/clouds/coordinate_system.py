@@ -62,8 +62,8 @@ def given_system(text: str) -> str:
     if match := CODE.fullmatch(given):
         codes = [int(code) for code in match.groups() if code]
         if not all(LEAST_CODE <= code <= GREATEST_CODE for code in codes):
-            text = f"crs: EPSG gives codes from {LEAST_CODE} to {GREATEST_CODE}, got {given!r:.60}"
-            raise MeshError("point cloud", [text])
+            text = f"expected a code of EPSG from {LEAST_CODE} to {GREATEST_CODE}, got {given!r:.60}"
+            raise MeshError("crs", [text])
         name = f"EPSG:{'+'.join(map(str, codes))}"
     elif WELL_KNOWN_TEXT.fullmatch(given) and given.count("[") == given.count("]"):
         name, is_degrees = name_of_text(given), DEGREES_OF_TEXT.match(given) is not None
@@ -72,15 +72,15 @@ def given_system(text: str) -> str:
         is_geocentric = GEOCENTRIC_FORM.search(given) is not None
         _refuse_zone(given)
     if not name:
-        raise MeshError("point cloud", [f"crs: {EXPECTED}, got {given!r:.60}"])
+        raise MeshError("crs", [f"{EXPECTED}, got {given!r:.60}"])
     system = None if is_degrees or is_geocentric else registered(name if name.startswith("EPSG:") else given)
     if is_degrees or (system is not None and system.is_geographic):
-        raise MeshError("point cloud", [f"crs: {name} is in degrees, a map is in metres; project the points first"])
+        raise MeshError("crs", [f"{name} is in degrees, a map is in metres; project the points first"])
     if is_geocentric or (system is not None and system.is_geocentric):
-        text = f"crs: {name} has its origin in the earth's centre, where z is not up; project the points first"
-        raise MeshError("point cloud", [text])
+        text = f"{name} has its origin in the earth's centre, where z is not up; project the points first"
+        raise MeshError("crs", [text])
     if system is not None and system.is_vertical and not system.is_compound:
-        raise MeshError("point cloud", [f"crs: {name} is of heights alone; give the one of x and y, or both as A+B"])
+        raise MeshError("crs", [f"{name} is of heights alone; give the one of x and y, or both as A+B"])
     return name
 
 
@@ -89,4 +89,4 @@ def _refuse_zone(given: str) -> None:
     match = ZONE_OF_PROJ.search(given)
     zone = match and (match.group(1) or match.group(2))
     if zone and not (zone.isdecimal() and 1 <= int(zone) <= 60):
-        raise MeshError("point cloud", [f"crs: expected a zone of UTM from 1 to 60, got {zone!r:.60}"])
+        raise MeshError("crs", [f"expected a zone of UTM from 1 to 60, got {zone!r:.60}"])

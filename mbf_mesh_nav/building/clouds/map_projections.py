@@ -31,15 +31,15 @@ def registered(text: str) -> CRS:
         from pyproj import CRS
         from pyproj.exceptions import CRSError
     except ImportError as error:
-        text = "crs: checking a coordinate system needs pyproj: pip install 'mbf-flex[maps]'"
-        raise MeshError("point cloud", [text]) from error
+        text = "checking a coordinate system needs pyproj: pip install 'mbf-flex[maps]'"
+        raise MeshError("crs", [text]) from error
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FutureWarning)  # of the old form +init=epsg:25832
             return CRS.from_user_input(text)
     except CRSError as error:
         register = "the EPSG register has no such system" if text.startswith("EPSG:") else "PROJ knows no such system"
-        raise MeshError("point cloud", [f"crs: {register}, got {text!r:.60}"]) from error
+        raise MeshError("crs", [f"{register}, got {text!r:.60}"]) from error
 
 
 def contradicts(stated: str, given: str) -> bool:

@@ -52,10 +52,10 @@ def read_mesh_points(path: Path, max_points: int, up_axis: str, unit: float) -> 
         raise MeshError(str(path), ["its faces have no area"])
     density = max(LEAST_DENSITY, len(vertices) / area)
     if area * density > max_points:
-        text = f"{area:.6g} m2 of faces need {area * density:.0f} samples, the limit is {max_points} (max_points)"
+        text = f"{area:.6g} m² of faces need {area * density:.0f} samples, the limit is {max_points} (max_points)"
         raise MeshError(str(path), [text])
     points = _samples(a, b - a, c - a, areas * density)
-    return StoredPoints(points, notes=(f"{len(faces)} faces sampled with {density:.0f} points/m2",))
+    return StoredPoints(points, notes=(f"{len(faces)} faces sampled with {density:.0f} points/m²",))
 
 
 def _samples(corner: FloatArray, along: FloatArray, across: FloatArray, wanted: FloatArray) -> FloatArray:

@@ -148,8 +148,10 @@ def _judge_systems(systems: dict[str, str], given: str, crs: str) -> list[str]:
         return []
     known = given if given.startswith("EPSG:") else crs.strip()
     if against := [f"{name} {one}" for one, name in systems.items() if contradicts(one, known)]:
-        text = f"the files state another coordinate system ({', '.join(against)}) than is given ({given})"
-        raise MeshError("point cloud", [text], "Leave it out, or transform the points, or correct what the files state")
+        text = f"the files state another coordinate system ({', '.join(against)}) than the one given ({given})"
+        raise MeshError(
+            "point cloud", [text], "Leave crs out, or transform the points, or correct what the files state"
+        )
     return [f"{name} states {one}, the map keeps {given} as given" for one, name in systems.items() if one != given]
 
 

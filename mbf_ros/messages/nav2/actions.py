@@ -71,7 +71,7 @@ def _via_goal_of(message: Message, context: MessageContext) -> GetPathGoal:
     poses = poses_or_refuse(message["goals"], context, "goals")
     if not poses:
         code = codes.ThroughPosesCode.NO_VIAPOINTS_GIVEN
-        raise RefusedGoal(GetPathOutcome.INVALID_GOAL, "goals: there is no pose to go to", error_code=code)
+        raise RefusedGoal(GetPathOutcome.INVALID_GOAL, "goals: expected at least one pose, got none", error_code=code)
     return GetPathGoal(poses[-1], _start(message, context), message["planner_id"], via=poses[:-1])
 
 
@@ -132,7 +132,7 @@ def _smooth_goal_of(message: Message, context: MessageContext) -> RefinePathGoal
     code = codes.SmoothingCode.INVALID_PATH
     path = path_or_refuse(message, context, RefinePathOutcome.FAILURE, error_code=code)
     if len(path) == 0:
-        raise RefusedGoal(RefinePathOutcome.FAILURE, "path: there is no pose", error_code=code)
+        raise RefusedGoal(RefinePathOutcome.FAILURE, "path: expected at least one pose, got none", error_code=code)
     return RefinePathGoal(path, message["smoother_id"])
 
 

@@ -82,7 +82,7 @@ def _straight(message: Message) -> tuple[float, float]:
     """Distance [m] and speed [m/s] of a goal; raises RefusedGoal where it is not along the heading."""
     target = message["target"]
     if target["y"] or target["z"]:
-        text = f"target must lie on the robot's x axis, got y {target['y']} and z {target['z']}"
+        text = f"target: expected a point on the robot's x axis, got y {target['y']} m and z {target['z']} m"
         raise RefusedGoal(RecoveryOutcome.FAILURE, text)
     return target["x"], message["speed"]
 
@@ -99,7 +99,7 @@ def _back_up(message: Message) -> Numbers:
 def _drive(message: Message) -> Numbers:
     distance, speed = _straight(message)
     if math.copysign(1.0, distance) != math.copysign(1.0, speed):
-        text = f"distance and speed must have the same sign, got {distance} m and {speed} m/s"
+        text = f"speed: expected the sign of the distance ({distance} m), got {speed} m/s"
         raise RefusedGoal(RecoveryOutcome.FAILURE, text)
     return {"distance": distance, "speed": abs(speed), **_time_limit(message)}
 

@@ -29,9 +29,9 @@ def _waypoints_goal_of(message: Message, context: MessageContext) -> FollowWaypo
         text = f"goal_index {first} together with number_of_loops {more} is not supported here"
         raise RefusedGoal(MoveBaseOutcome.FAILURE, text)
     if not poses[first:]:
-        raise RefusedGoal(
-            GetPathOutcome.INVALID_GOAL, f"poses: there is none from goal_index {first} on", error_code=code
-        )
+        text = f"goal_index: expected one below the number of poses ({len(poses)}), got {first}"
+        text = text if poses else "poses: expected at least one pose, got none"
+        raise RefusedGoal(GetPathOutcome.INVALID_GOAL, text, error_code=code)
     return FollowWaypointsGoal(poses[first:], loops=more + 1, stop_on_failure=False)
 
 
@@ -102,7 +102,7 @@ def _through_goal_of(message: Message, context: MessageContext) -> MoveBaseGoal:
     unsupported(message, MoveBaseOutcome.FAILURE, "behavior_tree", error_code=code)
     poses = poses_or_refuse(message["poses"], context, "poses")
     if not poses:
-        raise RefusedGoal(GetPathOutcome.INVALID_GOAL, "poses: there is none")
+        raise RefusedGoal(GetPathOutcome.INVALID_GOAL, "poses: expected at least one pose, got none")
     return MoveBaseGoal(poses[-1], via=poses[:-1])
 
 

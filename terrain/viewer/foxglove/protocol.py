@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import Any, NamedTuple
 
+from mbf_abstract.config.findings import describe_value
+
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 MESSAGE, TIME, RESPONSE = 1, 2, 3  # opcodes of the server
 PUBLISHED, CALL = 1, 2  # opcodes of clients
@@ -74,7 +76,7 @@ def json_in(text: str | bytes) -> Any:
     """Return the value of a JSON text; raises ProtocolError where it is none, or one with NaN or infinity."""
 
     def refuse(name: str) -> Any:
-        raise ValueError(f"{name} is no number of JSON")
+        raise ValueError(f"JSON has no number {name}")
 
     try:
         return json.loads(text, parse_constant=refuse)
@@ -86,7 +88,7 @@ def list_in(operation: Mapping[str, Any], name: str) -> list[Any]:
     """Return a list of an operation; raises ProtocolError where it is none."""
     value = operation.get(name)
     if not isinstance(value, list):
-        raise ProtocolError(f"{operation['op']}: {name!r} must be a list")
+        raise ProtocolError(f"{operation['op']}: {name}: expected a list, got {describe_value(value)}")
     return value
 
 
@@ -94,7 +96,7 @@ def number_in(item: Any, name: str) -> int:
     """Return a number of 32 bits in an object; raises ProtocolError where it is none."""
     value = item.get(name) if isinstance(item, dict) else None
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MAX_NUMBER:
-        raise ProtocolError(f"{name!r} must be a whole number from 0 to {MAX_NUMBER}")
+        raise ProtocolError(f"{name}: expected a whole number from 0 to {MAX_NUMBER}, got {describe_value(value)}")
     return value
 
 
@@ -102,7 +104,7 @@ def text_in(item: Any, name: str) -> str:
     """Return a text in an object; raises ProtocolError where it is missing, no text or long."""
     value = item.get(name) if isinstance(item, dict) else None
     if not isinstance(value, str) or len(value) > MAX_TEXT:
-        raise ProtocolError(f"{name!r} must be a text of at most {MAX_TEXT} characters")
+        raise ProtocolError(f"{name}: expected a text of at most {MAX_TEXT} characters, got {describe_value(value)}")
     return value
 
 

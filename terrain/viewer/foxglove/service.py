@@ -10,6 +10,7 @@ from typing import Any
 from mbf_abstract.access.outbox import Frame
 from mbf_abstract.access.page_access import Role
 from mbf_abstract.access.visitor import HangUp
+from mbf_abstract.config.findings import describe_value
 from mbf_abstract.event_values import error_text
 from terrain.recording.recording import Recording
 from terrain.viewer.foxglove import protocol
@@ -138,7 +139,9 @@ class FoxgloveService:
         if client.role is not Role.STEER:
             client.outbox.answer(protocol.service_failure(call, "this client may only watch"))
         elif call.encoding != "json" or not 0 < call.service <= len(names):
-            client.outbox.answer(protocol.service_failure(call, "expected a service of this server, called with json"))
+            expected = f"a service from 1 to {len(names)}, called with json"
+            got = f"service {call.service} with {describe_value(call.encoding)}"
+            client.outbox.answer(protocol.service_failure(call, f"expected {expected}, got {got}"))
         else:
             name = names[call.service - 1]
             self._steering.call(name)
@@ -168,8 +171,8 @@ class FoxgloveService:
                 text = f"{topic[:80]!r}: nobody listens; poses and places are taken on {', '.join(INPUTS)}"
                 client.outbox.newest(UNHEARD, protocol.status(Level.INFO, text))
                 return
-            if text_in(one, "encoding") != "json":
-                raise ProtocolError(f"{topic!r}: expected the encoding json")
+            if (encoding := text_in(one, "encoding")) != "json":
+                raise ProtocolError(f"{topic!r}: expected the encoding json, got {describe_value(encoding)}")
             client.inputs[number] = topic
 
         _for_each(list_in(operation, "channels"), advertise)

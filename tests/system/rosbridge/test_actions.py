@@ -186,7 +186,12 @@ def test_a_path_that_means_nothing_is_an_invalid_path(serving, connect, send):
     ("name", "kind", "goal", "text"),
     [
         ("/dance", "dances/action/Waltz", {}, "there is no action '/dance'"),
-        ("/navigate_to_pose", "mbf_msgs/action/MoveBase", {}, "/navigate_to_pose has the type nav2_msgs/action"),
+        (
+            "/navigate_to_pose",
+            "mbf_msgs/action/MoveBase",
+            {},
+            "the action '/navigate_to_pose': expected the type nav2_msgs/action",
+        ),
         ("/navigate_to_pose", "nav2_msgs/action/NavigateToPose", {}, "the field 'pose' of"),
         (
             "/navigate_to_pose",

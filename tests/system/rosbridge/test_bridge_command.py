@@ -54,10 +54,10 @@ def test_it_serves_until_it_is_interrupted_and_says_farewell(config, raw, ask, s
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        (["--sensor", "/scan"], "--sensor must be TOPIC:TYPE=SOURCE with one of the types LaserScan"),
+        (["--sensor", "/scan"], "--sensor: expected TOPIC:TYPE=SOURCE with one of the types LaserScan"),
         (["--sensor", "/scan:Image=camera"], "got '/scan:Image=camera'"),
-        (["--robot-only"], "--robot-only is of scenarios; the robot of a navigation file is a client itself"),
-        (["--seed", "3"], "--backend and --seed are of scenarios"),
+        (["--robot-only"], "--robot-only is for scenarios: the robot of a navigation file is a client itself"),
+        (["--seed", "3"], "--backend and --seed are for scenarios"),
         (["--robot-only", "--foxglove"], "--foxglove shows a navigator, which --robot-only leaves out"),
         (["--foxglove-read-only"], "it goes with --foxglove only"),
         (["--foxglove", "--foxglove-at", "here:there"], "expected HOST:PORT with a port"),

@@ -67,7 +67,7 @@ def test_a_client_of_the_server_publishes_the_map_and_a_bad_one_is_answered_and_
         bad = {"op": "publish", "topic": "/map", "msg": grid(40, 31, data=[0] * 3)}
         answer = ask(socket, bad, "status")
         assert (answer["level"], "/map" in answer["msg"]) == ("error", True)
-        assert "the data has 3 cells, its size is 40 x 31" in answer["msg"]
+        assert "data: expected 40 x 31 cells, at least one, got 3" in answer["msg"]
         wall = {"x": 4, "y": 4, "width": 2, "height": 2, "data": [100] * 4}
         say(socket, op="publish", topic="/map_updates", msg=wall)
         blocked = GetPathOutcome.BLOCKED_START

@@ -150,7 +150,11 @@ def test_folders_without_one_recording_are_refused(tmp_path):
         (tmp_path / name).mkdir()
         recording_of(make_log(0)).save(tmp_path / name / "recording.npz")
     result = CliRunner().invoke(make_app(), ["bag", "export", str(tmp_path)], env={"COLUMNS": "300"})
-    assert result.exit_code == 2 and "holds several robots" in result.output and "bob" in result.output
+    assert (
+        result.exit_code == 2
+        and "expected the folder of one robot, got that of 2" in result.output
+        and "bob" in result.output
+    )
 
 
 def test_scans_of_older_recordings_begin_where_the_robot_was():

@@ -71,16 +71,16 @@ def test_a_topic_without_a_map_says_so(tmp_path):
         chatter = writer.add_connection("/chatter", "std_msgs/msg/Empty", typestore=store)
         writer.write(chatter, 10**9, b"\x00\x01\x00\x00\x00")
     with open_bag(tmp_path / "drive") as bag:
-        with pytest.raises(BagError, match=r"no map on /map$"):
+        with pytest.raises(BagError, match=r"expected a map on /map, got none$"):
             read_recorded_map(bag, "/map", math.inf)
-        with pytest.raises(BagError, match=r"no map on /map in the first 3 s$"):
+        with pytest.raises(BagError, match=r"expected a map on /map in the first 3 s, got none$"):
             read_recorded_map(bag, "/map", 3.0)
 
 
 def test_a_time_that_is_no_number_is_refused(tmp_path):
     with (
         open_bag(make_bag(tmp_path, [grid(0.0, CELLS)])) as bag,
-        pytest.raises(ValueError, match="--at must be 0 s or more, got nan"),
+        pytest.raises(ValueError, match="--at: expected 0 s or more, got nan"),
     ):
         read_recorded_map(bag, "/map", math.nan)
 
@@ -92,8 +92,8 @@ def test_of_several_maps_the_one_named_map_is_taken_or_asked_for(tmp_path):
     (tmp_path / "two").mkdir()
     two = make_bag(tmp_path / "two", [grid(0.0, CELLS, "/one/map"), grid(0.0, CELLS, "/two/map")])
     refused = run(two, "--out", tmp_path / "c.yaml")
-    assert refused.exit_code == 2 and "found /one/map, /two/map; choose by --topic" in refused.output
-    assert "/robot/odom: expected a topic of" in run(bag, "--topic", "/robot/odom").output
+    assert refused.exit_code == 2 and "got /one/map, /two/map; choose by --topic" in refused.output
+    assert "--topic: expected a topic of" in run(bag, "--topic", "/robot/odom").output
 
 
 def test_a_replay_with_the_recorded_map_has_its_walls(tmp_path, replayed):
@@ -118,9 +118,9 @@ def test_a_replay_takes_the_recorded_map_where_a_layer_expects_it(tmp_path, repl
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"width": 5}, "has 24 cells, its size is 5 x 4"),
+        ({"width": 5}, "data: expected 5 x 4 cells, at least one, got 24"),
         ({"resolution": 0.0}, "info.resolution: expected 0.0001 to 1000 m, got 0"),
-        ({"origin": {"position": {"x": float("nan"), "y": 0.0}}}, "the map means nothing: info.origin: "),
+        ({"origin": {"position": {"x": float("nan"), "y": 0.0}}}, "the recorded map: info.origin: "),
     ],
 )
 def test_a_map_that_means_nothing_is_refused(tmp_path, change, text):
@@ -133,5 +133,5 @@ def test_a_map_that_means_nothing_is_refused(tmp_path, change, text):
 def test_a_bag_without_a_map_says_so(tmp_path):
     with open_bag(make_bag(tmp_path, drive(0.1))) as bag:
         assert "/map" not in bag.types
-    assert "expected one topic of nav_msgs/msg/OccupancyGrid, found none" in run(tmp_path / "drive").output
-    assert "must be a .yaml file" in run(tmp_path / "drive", "--out", tmp_path / "map.pgm").output
+    assert "expected one topic of the type nav_msgs/msg/OccupancyGrid, got none" in run(tmp_path / "drive").output
+    assert "expected a .yaml file, got" in run(tmp_path / "drive", "--out", tmp_path / "map.pgm").output

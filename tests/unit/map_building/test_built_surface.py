@@ -162,7 +162,7 @@ def test_the_order_of_the_points_does_not_change_a_bit(rng, quantum):
         (np.zeros((500, 3)), "all of its points lie on one line"),
         (np.linspace((0, 0, 0), (30, 10, 2), 500), "all of its points lie on one line"),
         (np.random.default_rng(1).uniform(0, 300, (200, 3)), "points are isolated"),
-        (np.random.default_rng(1).uniform(0, (2, 2, 0.1), (400, 3)), "there is no surface of 10 m2 in it"),
+        (np.random.default_rng(1).uniform(0, (2, 2, 0.1), (400, 3)), "there is no surface of 10 m² in it"),
     ],
 )
 def test_points_that_are_no_map_are_refused(points, text):

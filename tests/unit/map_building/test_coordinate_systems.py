@@ -59,7 +59,9 @@ ZONE_32 = 'PROJCS["ETRS89 / UTM zone 32N",UNIT["metre",1]]'
 )
 def test_a_given_coordinate_system_that_contradicts_that_of_a_file_is_refused(tmp_path, text, given):
     file = write_las(tmp_path / "survey.las", POINTS, well_known_text=text)
-    expected = r"the files state another coordinate system \(survey.las .*\) than is given .*Leave it out, or transform"
+    expected = (
+        r"the files state another coordinate system \(survey.las .*\) than the one given .*Leave crs out, or transform"
+    )
     with pytest.raises(MeshError, match=f"(?s){expected}"):
         read_clouds([file], crs=given)
 
@@ -114,14 +116,14 @@ def test_a_given_coordinate_system_is_kept_by_its_code_or_name(given, kept):
 )
 def test_what_is_no_coordinate_system_is_refused_before_a_file_is_read(tmp_path, given):
     text = refusal(tmp_path / "none.las", crs=given)
-    assert text.startswith("point cloud: crs: expected a code such as EPSG:25832, well-known text or a PROJ string")
+    assert text.startswith("crs: expected a code such as EPSG:25832, well-known text or a PROJ string")
     assert text.endswith(f"got {given!r}")
 
 
 @pytest.mark.parametrize("given", ["EPSG:99999999", "EPSG:12", "EPSG:25832+1", "urn:ogc:def:crs:EPSG::40000"])
 def test_a_code_that_epsg_does_not_give_is_refused_as_one(tmp_path, given):
     text = refusal(tmp_path / "none.las", crs=given)
-    assert text == f"point cloud: crs: EPSG gives codes from 1024 to 32766, got {given!r}"
+    assert text == f"crs: expected a code of EPSG from 1024 to 32766, got {given!r}"
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,7 @@ def test_the_figures_are_printed(tmp_path, survey):
         "error",
         "heights",
         "origin",
-        "crs",
+        "coordinates",
     ]
     assert "taken as metres" in done.stdout
 

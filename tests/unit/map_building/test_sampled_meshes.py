@@ -26,7 +26,7 @@ def test_a_mesh_becomes_the_same_hill(tmp_path, name, vertices):
     expected = build_surface(read_clouds([exported(tmp_path / "expected.off")]).points)
     assert surface.patches.grid.cell == 0.2
     np.testing.assert_allclose(surface.vertices, expected.vertices, atol=0.03)
-    assert "1536 faces sampled with 100 points/m2" in cloud.notes[0]
+    assert "1536 faces sampled with 100 points/m²" in cloud.notes[0]
 
 
 def test_every_face_gets_points_by_its_area(tmp_path):
@@ -64,7 +64,7 @@ def test_the_axis_and_the_unit_that_are_given_win(tmp_path):
 
 
 def test_meshes_that_cannot_be_sampled_and_elevation_models_are_refused(tmp_path):
-    with pytest.raises(MeshError, match=r"m2 of faces need 19\d* samples, the limit is 5000 \(max_points\)"):
+    with pytest.raises(MeshError, match=r"m² of faces need 19\d* samples, the limit is 5000 \(max_points\)"):
         read_clouds([exported(tmp_path / "hill.obj")], max_points=5000)
     with pytest.raises(MeshError, match="its faces have no area"):
         read_clouds([exported(tmp_path / "line.off", np.eye(3) * 0.0, [[0, 1, 2]])])

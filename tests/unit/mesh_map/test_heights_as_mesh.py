@@ -97,7 +97,11 @@ def test_an_elevation_model_is_a_mesh_whose_voids_are_holes(tmp_path, ending):
 @pytest.mark.parametrize(
     ("name", "content", "text"),
     [
-        ("a.asc", "ncols 3\nnrows 2\n1 2 3 4 5 6\n", "cannot be read as an elevation model: header without cellsize"),
+        (
+            "a.asc",
+            "ncols 3\nnrows 2\n1 2 3 4 5 6\n",
+            "cannot be read as an elevation model: expected cellsize in the header, got none",
+        ),
         ("a.asc", "ncols 2\nnrows 2\ncellsize 1\nnodata_value 0\n0 0 0 0\n", "no face"),
         ("a.tif", "no tiff", "cannot be read"),
         ("a.npz", "no zip", "cannot be read"),

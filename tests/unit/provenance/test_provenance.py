@@ -171,8 +171,8 @@ def test_files_that_changed_or_are_missing_are_named(tmp_path):
     ("change", "key", "expected"),
     [
         ({"clock": "lunar"}, "clock", "'simulated' or 'real'"),
-        ({"files": {"../secret.txt": "1"}}, "files.../secret.txt", "inside of the folder"),
-        ({"files": {"/etc/passwd": "1"}}, "files./etc/passwd", "inside of the folder"),
+        ({"files": {"../secret.txt": "1"}}, "files.../secret.txt", "inside the folder"),
+        ({"files": {"/etc/passwd": "1"}}, "files./etc/passwd", "inside the folder"),
         ({"code": {"terrain": {}}}, "code.terrain.sha256", "a value"),
         ({"colour": "red"}, "colour", "a known key"),
     ],
@@ -189,7 +189,7 @@ def test_a_damaged_record_is_refused_with_its_key(change, key, expected, tmp_pat
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match=r"expected the folder of a run, with provenance.yaml, got none"):
+    with pytest.raises(ConfigError, match=r"expected the folder of a run, with provenance.yaml, got a folder without it"):
         read_provenance(tmp_path)
-    with pytest.raises(ConfigError, match="no folder"):
+    with pytest.raises(ConfigError, match="no such folder"):
         read_provenance(tmp_path / "nowhere")

@@ -89,7 +89,7 @@ def test_all_mistakes_come_at_once_with_their_lines(write):
 def test_a_circle_of_joints_is_named(write):
     loop = link("a") + link("b") + joint("ab", "a", "b", "0 0 0", "fixed") + joint("ba", "b", "a", "0 0 0", "fixed")
     found = findings_of(write, robot(BODY, *FOUR_WHEELS, loop))
-    assert len(found) == 2 and all("a circle of joints" in text for text in found)
+    assert len(found) == 2 and all("a cycle of joints" in text for text in found)
 
 
 @pytest.mark.parametrize(

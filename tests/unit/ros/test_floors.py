@@ -43,9 +43,9 @@ def test_a_grid_lies_where_its_origin_is():
 @pytest.mark.parametrize(
     ("message", "text"),
     [
-        (grid([0] * 5, 2, 3), "the data has 5 cells, its size is 2 x 3"),
-        (grid([], 0, 0), "the data has 0 cells, its size is 0 x 0"),
-        (grid([0], 2**32 - 1, 2**32 - 1), "the data has 1 cells, its size is 4294967295 x 4294967295"),
+        (grid([0] * 5, 2, 3), "data: expected 2 x 3 cells, at least one, got 5"),
+        (grid([], 0, 0), "data: expected 0 x 0 cells, at least one, got 0"),
+        (grid([0], 2**32 - 1, 2**32 - 1), "data: expected 4294967295 x 4294967295 cells, at least one, got 1"),
         (grid([0], 1, 1, resolution=math.nan), "info.resolution: expected 0.0001 to 1000 m, got nan"),
         (grid([0], 1, 1, resolution=-0.05), "got -0.05"),
         (grid([0], 1, 1, resolution=math.inf), "got inf"),
@@ -66,7 +66,7 @@ def test_an_update_is_a_window_of_its_grid():
     window = floor_window_of(completed("map_msgs/OccupancyGridUpdate", values), CONTEXT)
     assert (window.x, window.y, window.frame_id) == (3, 4, "map")
     assert window.occupancy.tolist() == [[100, 255]]
-    with pytest.raises(InvalidValueError, match="the data has 2 cells, its size is 3 x 1"):
+    with pytest.raises(InvalidValueError, match="data: expected 3 x 1 cells, at least one, got 2"):
         floor_window_of(completed("map_msgs/OccupancyGridUpdate", {**values, "width": 3}), CONTEXT)
 
 

@@ -47,11 +47,16 @@ def test_a_path_is_checked_up_to_a_state_and_zero_is_none():
             "CheckPose",
             {"pose": HERE, "costmap": 0},
             MessageError,
-            r"costmap must be 1 \(local\) or 2 \(global\), got 0",
+            r"costmap: expected 1 \(local\) or 2 \(global\), got 0",
         ),
         ("CheckPose", {"pose": HERE, "safety_dist": -1.0}, InvalidValueError, "safety_dist must be 0 m or more"),
-        ("CheckPose", {"pose": HERE, "lethal_cost_mult": None}, InvalidValueError, "lethal_cost_mult must be finite"),
-        ("CheckPath", {"path": {"poses": []}, "return_on": 9}, MessageError, "return_on must be a state from 0 to 4"),
+        (
+            "CheckPose",
+            {"pose": HERE, "lethal_cost_mult": None},
+            InvalidValueError,
+            "lethal_cost_mult: expected a finite number",
+        ),
+        ("CheckPath", {"path": {"poses": []}, "return_on": 9}, MessageError, "return_on: expected a state from 0 to 4"),
     ],
 )
 def test_a_request_that_means_nothing_is_refused(kind, fields, error, text):

@@ -41,7 +41,7 @@ def test_a_way_through_poses_leads_to_the_last_one_by_way_of_the_others(goals):
 
 
 def test_a_way_through_no_poses_is_refused():
-    with pytest.raises(RefusedGoal, match="there is none"):
+    with pytest.raises(RefusedGoal, match="expected at least one pose, got none"):
         waypoints.NAVIGATE_THROUGH_POSES.goal({"poses": []}, CONTEXT)
 
 
@@ -92,16 +92,21 @@ def test_what_cannot_be_respected_is_refused_and_not_ignored(mapping, values, te
 
 
 @pytest.mark.parametrize(
-    ("mapping", "values"),
+    ("mapping", "values", "text"),
     [
-        (nav2.COMPUTE_PATH_THROUGH_POSES, {"goals": []}),
-        (waypoints.FOLLOW_WAYPOINTS, {"poses": [at(1)], "goal_index": 1}),
-        (nav2.NAVIGATE_TO_POSE, {"pose": at(float("nan"))}),
-        (waypoints.FOLLOW_WAYPOINTS, {"poses": [at(1), at(float("inf"))]}),
+        (nav2.COMPUTE_PATH_THROUGH_POSES, {"goals": []}, "goals: expected at least one pose, got none"),
+        (waypoints.FOLLOW_WAYPOINTS, {"poses": []}, "poses: expected at least one pose, got none"),
+        (
+            waypoints.FOLLOW_WAYPOINTS,
+            {"poses": [at(1)], "goal_index": 1},
+            r"goal_index: expected one below .* \(1\), got 1",
+        ),
+        (nav2.NAVIGATE_TO_POSE, {"pose": at(float("nan"))}, "nan"),
+        (waypoints.FOLLOW_WAYPOINTS, {"poses": [at(1), at(float("inf"))]}, "inf"),
     ],
 )
-def test_a_goal_without_a_place_is_an_invalid_goal(mapping, values):
-    with pytest.raises(RefusedGoal) as refused:
+def test_a_goal_without_a_place_is_an_invalid_goal(mapping, values, text):
+    with pytest.raises(RefusedGoal, match=text) as refused:
         mapping.goal(values, CONTEXT)
     assert refused.value.outcome == GetPathOutcome.INVALID_GOAL
 

@@ -68,13 +68,13 @@ def test_backing_up_ignores_signs_and_driving_wants_the_same_ones(distance, spee
         assert math.copysign(parameters["speed"], parameters["distance"]) == speed
         with_changes(DriveOnHeadingParameters(), parameters)
     else:
-        with pytest.raises(RefusedGoal, match="the same sign"):
+        with pytest.raises(RefusedGoal, match="speed: expected the sign of the distance"):
             drive.parameters(values("drive_on_heading", goal))
 
 
 @pytest.mark.parametrize("name", ["backup", "drive_on_heading"])
 def test_a_target_beside_the_heading_is_refused(name):
-    with pytest.raises(RefusedGoal, match=r"got y 1\.0 and z 0\.0") as refused:
+    with pytest.raises(RefusedGoal, match=r"got y 1\.0 m and z 0\.0 m") as refused:
         BEHAVIORS[name].parameters(values(name, {"target": {"x": 1.0, "y": 1.0}, "speed": 0.1}))
     assert refused.value.outcome == RecoveryOutcome.FAILURE
 

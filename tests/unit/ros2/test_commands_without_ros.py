@@ -37,8 +37,12 @@ def test_what_is_missing_is_said_in_one_text(tmp_path):
         "--wall-clock does not go with --ros2": ["run", "indoor", "--ros2", "--wall-clock", "--out", str(tmp_path)],
         "--ros2-lockstep": ["run", "indoor", "--ros2-lockstep", "--out", str(tmp_path / "run")],
         "it goes with --ros2 only": ["run", "indoor", "--ros2-patience", "5", "--out", str(tmp_path / "run")],
-        "--sensor names the topic scan twice": ["ros2", str(file), *2 * ["--sensor", "scan:LaserScan=lidar"]],
-        "--sensor must be TOPIC:TYPE=SOURCE": ["ros2", str(file), "--sensor", "scan"],
+        "--sensor: expected each topic once, got 'scan' twice": [
+            "ros2",
+            str(file),
+            *2 * ["--sensor", "scan:LaserScan=lidar"],
+        ],
+        "--sensor: expected TOPIC:TYPE=SOURCE": ["ros2", str(file), "--sensor", "scan"],
         "the generators of ROS 2 are not installed": ["ros2-interfaces", "--into", str(tmp_path)],
         "map_msgs, mbf_msgs, mesh_msgs, nav2_msgs, tf2_msgs, got dance_msgs": ["ros2-interfaces", "dance_msgs"],
     }

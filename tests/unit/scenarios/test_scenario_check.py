@@ -197,6 +197,10 @@ def test_shipped_scenarios_have_no_mistakes(name):
     assert "backends" in check(LIBRARY / f"{name}.yaml", load=False).summary
 
 
+def test_one_goal_is_counted_as_one_goal():
+    assert check(LIBRARY / "outdoor.yaml", load=False).summary.endswith(", 1 goal")
+
+
 def test_a_shipped_scenario_is_checked_by_its_name():
     result = mbf("check", "crowded_corridor", "--no-load")
 

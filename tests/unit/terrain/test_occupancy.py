@@ -99,6 +99,13 @@ def test_a_narrow_or_misplaced_door_is_refused(tmp_path: Path) -> None:
             read_floor_plan(plan)
 
 
+def test_a_floor_plan_without_a_key_is_refused_by_its_name(tmp_path: Path) -> None:
+    plan = tmp_path / "plan.yaml"
+    plan.write_text("size: [5, 5]\nwall_thickness: 0.1\n")
+    with pytest.raises(FloorPlanError, match=r"plan.yaml: expected the key 'rooms', got none$"):
+        read_floor_plan(plan)
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
