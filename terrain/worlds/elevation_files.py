@@ -129,13 +129,8 @@ def read_elevation(path: str | Path, max_samples: int = MAX_SAMPLES) -> Elevatio
         Missing file, unknown ending, too many samples, or contents that do not match the ending.
     """
     path = Path(path)
-    readers = {
-        ".asc": _read_esri_ascii,
-        ".hgt": _read_hgt,
-        ".tif": _read_geotiff,
-        ".tiff": _read_geotiff,
-        ".npz": _read_npz,
-    }
+    readers = {".asc": _read_esri_ascii, ".hgt": _read_hgt, ".npz": _read_npz}
+    readers |= {".tif": _read_geotiff, ".tiff": _read_geotiff}
     reader = readers.get(path.suffix.lower())
     if reader is None:
         raise TerrainFileError(path, f"unknown ending '{path.suffix}', known are: {', '.join(sorted(readers))}")
