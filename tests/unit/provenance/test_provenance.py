@@ -189,7 +189,7 @@ def test_a_damaged_record_is_refused_with_its_key(change, key, expected, tmp_pat
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match=r"expected the folder of a run, with provenance.yaml, got a folder without it"):
+    with pytest.raises(ConfigError, match=r"the folder of a run, with provenance.yaml, got a folder without it"):
         read_provenance(tmp_path)
     with pytest.raises(ConfigError, match="no such folder"):
         read_provenance(tmp_path / "nowhere")
