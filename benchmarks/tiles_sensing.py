@@ -42,7 +42,7 @@ LAYERS = (
     MeshLayerEntry(name="around", type="inflation", inputs=("seen",)),
 )
 BLOCKS = {
-    "seen": {"sources": ("lidar",), "max_obstacle_dist": 10.0},
+    "seen": {"sources": ("lidar",), "obstacle_max_range": 10.0},
     "around": {"inscribed_radius": 0.3, "inflation_radius": 1.0, "lethal_value": float("inf")},
 }
 

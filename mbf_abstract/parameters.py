@@ -58,6 +58,7 @@ def parameter(
     description: str,
     *,
     unit: str = "",
+    was: str = "",
     dynamic: bool = True,
     ge: float | None = None,
     gt: float | None = None,
@@ -75,6 +76,8 @@ def parameter(
         One sentence for the docs page.
     unit : str
         SI unit, empty for a pure number or a text.
+    was : str
+        Its earlier name, which is refused with a hint to this one.
     dynamic : bool
         Whether a change at run time takes effect on running goals; otherwise it is read when a goal starts.
     ge, gt, le, lt : float, optional
@@ -90,5 +93,5 @@ def parameter(
         le=le,
         lt=lt,
         allow_inf_nan=True if allow_inf else None,
-        json_schema_extra={"unit": unit, "dynamic": dynamic},
+        json_schema_extra={"unit": unit, "was": was, "dynamic": dynamic},
     )

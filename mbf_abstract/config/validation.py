@@ -118,8 +118,8 @@ def _finding_of(
 ) -> Finding:
     path = (*key_path, *loc)
     if error["type"] == "extra_forbidden":
-        known = _keys_at(model, loc[:-1])
-        return document.finding(path, "a known key", repr(loc[-1]), _key_hint(str(loc[-1]), known))
+        hint = _key_hint(str(loc[-1]), _fields_at(model, loc[:-1]))
+        return document.finding(path, "a known key", repr(loc[-1]), hint)
     got = "nothing" if error["type"] == "missing" else describe_value(error["input"])
     return document.finding(path, _expected(model, error, loc), got)
 
@@ -137,12 +137,20 @@ def _expected(model: type[ParameterModel], error: ErrorDetails, loc: KeyPath) ->
     return text.removeprefix("Input should be ")
 
 
-def _key_hint(key: str, known: list[str]) -> str:
-    closest = suggest(key, known)
+def _key_hint(key: str, fields: Mapping[str, FieldInfo]) -> str:
+    renamed = [name for name, field in fields.items() if _extra(field).get("was") == key]
+    if renamed:
+        return f"it is called {renamed[0]!r} now"
+    closest, known = suggest(key, fields), list(fields)
     if closest or not known:
         return closest
     more = ", ..." if len(known) > _MAX_LISTED_KEYS else ""
     return "known keys: " + ", ".join(known[:_MAX_LISTED_KEYS]) + more
+
+
+def _extra(field: FieldInfo) -> Mapping[str, Any]:
+    """What ``parameter`` has declared beside the range."""
+    return field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
 
 
 def _location_in_data(block: object, error: ErrorDetails) -> KeyPath:
@@ -167,11 +175,11 @@ def _field_at(model: type[BaseModel], loc: KeyPath) -> FieldInfo | None:
     return field
 
 
-def _keys_at(model: type[BaseModel], loc: KeyPath) -> list[str]:
-    """Keys of the block at a location, those of all alternatives if there are several."""
+def _fields_at(model: type[BaseModel], loc: KeyPath) -> dict[str, FieldInfo]:
+    """Fields of the block at a location by their keys, those of all alternatives if there are several."""
     field = _field_at(model, loc)
     models = [] if field is None else _models_in(field.annotation)
-    return list(dict.fromkeys(key for found in models or [model] for key in found.model_fields))
+    return {key: inner for found in models or [model] for key, inner in found.model_fields.items()}
 
 
 def _inner_model(annotation: Any) -> type[BaseModel] | None:

@@ -57,7 +57,9 @@ class RegulatedPurePursuitParameters(PluginParameters):
         1.5, "Farther from the path than this it is missed.", unit="m", gt=0.0, le=100.0
     )
     collision_check: bool = parameter(True, "Simulate the footprint ahead along the arc.")
-    collision_check_time: float = parameter(1.0, "How far ahead in time it is simulated.", unit="s", gt=0.0, le=10.0)
+    check_ahead_time: float = parameter(
+        1.0, "How far ahead the motion must be free.", unit="s", was="collision_check_time", gt=0.0, le=10.0
+    )
     min_distance_to_obstacle: float = parameter(
         0.0,
         "Least length ahead that is checked at low speed; 0 = only what the check time covers.",

@@ -13,7 +13,9 @@ from typing import Any
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath, MotionLimits, cannot_turn_ahead
-from mbf_abstract.maps.tracking.avoidance import MovingAround
+from mbf_abstract.maps.controllers.standing import StandingParameters
+from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
+from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_costmap_nav.control.path_handling import ControlCycle, PathFollower
 from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
@@ -22,6 +24,17 @@ from mbf_costmap_nav.plugins import CostmapContext
 LOOK, LOOK_STEP = 0.5, 0.1  # s
 AHEAD = 2.0
 """A place where the robot cannot turn counts so many radii of its outline ahead."""
+
+
+class SamplingParameters(PluginParameters):
+    """What all controllers that sample motions have."""
+
+    max_path_distance: float = parameter(2.0, "A path farther away is missed.", unit="m", gt=0.0, le=100.0)
+    check_ahead_time: float = parameter(
+        1.0, "How far ahead the whole footprint must be free.", unit="s", was="footprint_check_time", ge=0.0, le=10.0
+    )
+    moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
+    standing: StandingParameters = parameter(StandingParameters(), "What it does where its motions get it nowhere.")
 
 
 class SamplingFollower(PathFollower):

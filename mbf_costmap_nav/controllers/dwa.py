@@ -19,13 +19,12 @@ from mbf_abstract.geometry import Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.failures import no_motion
 from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
-from mbf_abstract.maps.controllers.standing import StandingParameters
-from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
+from mbf_abstract.maps.tracking.avoidance import MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlResult
 from mbf_costmap_nav.control.path_handling import ControlCycle
-from mbf_costmap_nav.control.sampling_follower import SamplingFollower
+from mbf_costmap_nav.control.sampling_follower import SamplingFollower, SamplingParameters
 from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score
 from mbf_costmap_nav.critics import CriticParameters
 from mbf_costmap_nav.critics.obstacle_critic import COLLISION
@@ -36,7 +35,7 @@ FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 
 
-class DWAParameters(PluginParameters):
+class DWAParameters(SamplingParameters):
     """Parameters of ``costmap.dwa``."""
 
     max_vel_x: float = parameter(0.5, "Largest forward speed.", unit="m/s", gt=0.0, le=20.0)
@@ -52,13 +51,9 @@ class DWAParameters(PluginParameters):
     vx_samples: int = parameter(15, "Samples of the forward speed.", ge=1, le=200)
     vy_samples: int = parameter(5, "Samples of the sideways speed.", ge=1, le=200)
     vtheta_samples: int = parameter(25, "Samples of the yaw rate.", ge=1, le=200)
-    max_path_distance: float = parameter(2.0, "A path farther away is missed.", unit="m", gt=0.0, le=100.0)
-    footprint_check_time: float = parameter(1.0, "How far the full footprint is checked.", unit="s", ge=0.0, le=10.0)
     critics: CriticParameters = parameter(
         CriticParameters(path_align=6.0, path_follow=8.0, obstacle=3.0), "Weights of the trajectory critics."
     )
-    moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
-    standing: StandingParameters = parameter(StandingParameters(), "What it does where its motions get it nowhere.")
 
 
 class DWAController(SamplingFollower):
@@ -103,7 +98,7 @@ class DWAController(SamplingFollower):
         met = around.meet(rollouts.poses, p.sim_step)
         hindered_by = around.hindering(met, costs)
         costs += met.costs
-        checked_steps = round(p.footprint_check_time / cycle.limit_factor / p.sim_step)
+        checked_steps = round(p.check_ahead_time / cycle.limit_factor / p.sim_step)
         for sample in np.argsort(costs, kind="stable").tolist():
             if costs[sample] >= COLLISION:
                 break

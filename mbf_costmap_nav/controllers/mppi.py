@@ -26,13 +26,12 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Twist
 from mbf_abstract.maps.controllers.failures import no_motion
 from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
-from mbf_abstract.maps.controllers.standing import StandingParameters
-from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
+from mbf_abstract.maps.tracking.avoidance import MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlResult, PlannedMotion
 from mbf_costmap_nav.control.path_handling import ControlCycle
-from mbf_costmap_nav.control.sampling_follower import SamplingFollower
+from mbf_costmap_nav.control.sampling_follower import SamplingFollower, SamplingParameters
 from mbf_costmap_nav.control.sampling_noise import correlated_noise, smoothing_matrix
 from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score
 from mbf_costmap_nav.critics import CriticParameters
@@ -52,7 +51,7 @@ FALLBACK_SAMPLES = 30
 """How many of the best single samples are tried when the mean does not fit."""
 
 
-class MPPIParameters(PluginParameters):
+class MPPIParameters(SamplingParameters):
     """Parameters of ``costmap.mppi``."""
 
     motion_model: Literal["differential", "omni", "ackermann"] = parameter(
@@ -86,11 +85,7 @@ class MPPIParameters(PluginParameters):
     )
     temperature: float = parameter(0.3, "Small = only the best samples count.", gt=0.0, le=100.0)
     gamma: float = parameter(0.015, "Cost of leaving the nominal sequence.", ge=0.0, le=10.0)
-    max_path_distance: float = parameter(2.0, "A path farther away is missed.", unit="m", gt=0.0, le=100.0)
-    footprint_check_time: float = parameter(1.0, "How far the full footprint is checked.", unit="s", ge=0.0, le=10.0)
     critics: CriticParameters = parameter(CriticParameters(), "Weights of the trajectory critics.")
-    moving_objects: AvoidanceParameters = parameter(AvoidanceParameters(), "How it keeps away from what moves.")
-    standing: StandingParameters = parameter(StandingParameters(), "What it does where its motions get it nowhere.")
 
 
 class MPPIController(SamplingFollower):
@@ -200,7 +195,7 @@ class MPPIController(SamplingFollower):
         costs += met.costs
         controls = blend(velocities, costs + self._control_cost(velocities), p.temperature, self._smoothing)[:, :, None]
         self._clip(cycle, controls)
-        checked_steps = max(1, round(p.footprint_check_time / cycle.limit_factor / p.model_dt))
+        checked_steps = max(1, round(p.check_ahead_time / cycle.limit_factor / p.model_dt))
         trajectory = np.empty_like(controls)
         integrate(controls, cycle.request.pose.yaw, p.model_dt, trajectory)
         # The mean of passing in front of somebody and passing behind them may lead into them.

@@ -168,7 +168,7 @@ class RegulatedPurePursuitController(RegulatedFollower):
 
     def _blocked(self, cycle: ControlCycle, command: Twist) -> str:
         """Where a command leads into an obstacle in the check time, not beyond the next cusp; empty if free."""
-        duration, shortest = self.parameters.collision_check_time, self.parameters.min_distance_to_obstacle
+        duration, shortest = self.parameters.check_ahead_time, self.parameters.min_distance_to_obstacle
         if cycle.touches:
             shortest = max(shortest, LEADS_OUT)
         if command.vx != 0.0:  # a robot that may creep as far as the check time allows ends up at the obstacle

@@ -49,8 +49,13 @@ class PathFollowerParameters(PluginParameters):
     max_path_distance: float = parameter(
         1.0, "Farther from the path than this the path is missed.", unit="m", gt=0.0, allow_inf=True
     )
-    obstacle_distance: float = parameter(
-        1.0, "The path is checked this far ahead on the current map; 0 = never.", unit="m", ge=0.0, le=20.0
+    check_ahead_dist: float = parameter(
+        1.0,
+        "How far ahead the path must be free on the current map; 0 = it is not checked.",
+        unit="m",
+        was="obstacle_distance",
+        ge=0.0,
+        le=20.0,
     )
     cost_limit: float = parameter(1.0, "Surface whose cost reaches this is an obstacle.", gt=0.0, allow_inf=True)
     max_surface_distance: float = parameter(
@@ -67,7 +72,7 @@ class PathFollower(SurfaceFollower):
     @classmethod
     def reach(cls, parameters: PathFollowerParameters) -> float:
         """To the end of the path that is checked, from a robot beside it."""
-        ahead = parameters.obstacle_distance
+        ahead = parameters.check_ahead_dist
         return max(ahead + parameters.max_path_distance if ahead else 0.0, parameters.max_surface_distance)
 
     @property
@@ -103,7 +108,7 @@ class PathFollower(SurfaceFollower):
 
     def _obstacle_on_path(self, here: FloatArray) -> str:
         """The first place on the path that the map forbids now, as a text; empty without one in reach."""
-        ahead = np.arange(0.0, self.parameters.obstacle_distance / self.limit_factor, OBSTACLE_STEP)
+        ahead = np.arange(0.0, self.parameters.check_ahead_dist / self.limit_factor, OBSTACLE_STEP)
         places = np.concatenate([here[None], self._tracker.points_at(self._tracker.progress + ahead)])
         return self.obstacle_along(places, self.parameters.max_surface_distance, self.parameters.cost_limit)
 

@@ -47,8 +47,13 @@ class VectorFieldParameters(PluginParameters):
     goal_distance: float = parameter(
         0.08, "Nearer to the goal than this the robot only turns to the final heading.", unit="m", gt=0.0
     )
-    obstacle_distance: float = parameter(
-        1.0, "The field is checked this far ahead on the current map; 0 = never.", unit="m", ge=0.0, le=20.0
+    check_ahead_dist: float = parameter(
+        1.0,
+        "How far ahead the field must be free on the current map; 0 = it is not checked.",
+        unit="m",
+        was="obstacle_distance",
+        ge=0.0,
+        le=20.0,
     )
     cost_limit: float = parameter(1.0, "Surface whose cost reaches this is an obstacle.", gt=0.0, allow_inf=True)
     via_distance: float = parameter(0.3, "A via point counts as passed within this distance.", unit="m", gt=0.0)
@@ -129,7 +134,7 @@ class VectorFieldController(SurfaceFollower):
         """The first place that the map forbids now where the field leads from here, as a text; empty without one."""
         p, field, places = self.parameters, self._fields[self._leg], [spot.point]
         there: SurfacePoint | None = spot
-        for _ in range(math.ceil(p.obstacle_distance / self.limit_factor / OBSTACLE_STEP)):
+        for _ in range(math.ceil(p.check_ahead_dist / self.limit_factor / OBSTACLE_STEP)):
             direction = None if there is None else field.direction_at(self.mesh_map, there)
             if there is None or direction is None or norm(field.goal - there.point) <= OBSTACLE_STEP:
                 break

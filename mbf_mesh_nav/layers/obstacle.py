@@ -48,11 +48,20 @@ class ObstacleParameters(LayerParameters):
         (), "Names of the sensors it listens to, each of which must send scans; empty = all that send any."
     )
     robot_height: float = parameter(1.0, "Points higher above the surface are not obstacles.", unit="m", gt=0.0)
-    min_obstacle_dist: float = parameter(
-        0.0, "Points no farther from the sensor are ignored, such as those of the robot itself.", unit="m", ge=0.0
+    obstacle_min_range: float = parameter(
+        0.0,
+        "Points no farther from the sensor are ignored, such as those of the robot itself.",
+        unit="m",
+        was="min_obstacle_dist",
+        ge=0.0,
     )
-    max_obstacle_dist: float = parameter(
-        np.inf, "Points farther from the sensor are ignored.", unit="m", gt=0.0, allow_inf=True
+    obstacle_max_range: float = parameter(
+        np.inf,
+        "Points farther from the sensor are ignored.",
+        unit="m",
+        was="max_obstacle_dist",
+        gt=0.0,
+        allow_inf=True,
     )
     ground_tolerance: float = parameter(0.05, "Points nearer to the mesh are part of it.", unit="m", ge=0.0)
     decay_time: float = parameter(
@@ -195,8 +204,8 @@ class ObstacleLayer(MeshLayer):
         """Faces (k,) below the points that are obstacles, and those points (k, 3)."""
         settings, points = self.parameters, scan.points
         distances = norm(points - scan.origin)
-        least = max(settings.min_obstacle_dist, NO_RANGE)
-        near = points[(distances > least) & (distances <= settings.max_obstacle_dist)]
+        least = max(settings.obstacle_min_range, NO_RANGE)
+        near = points[(distances > least) & (distances <= settings.obstacle_max_range)]
         near = near[self.locator.locate(near, settings.ground_tolerance).faces < 0]
         faces = self._below(near)
         return faces[faces >= 0], near[faces >= 0]

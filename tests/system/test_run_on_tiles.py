@@ -42,7 +42,7 @@ tiled_map:
   layers:
     - {name: obstacles, type: obstacle}
     - {name: around, type: inflation, inputs: [obstacles]}
-  obstacles: {sources: [lidar], robot_height: 0.6, max_obstacle_dist: 4.0, ground_tolerance: 0.25, decay_time: 30.0}
+  obstacles: {sources: [lidar], robot_height: 0.6, obstacle_max_range: 4.0, ground_tolerance: 0.25, decay_time: 30.0}
   around: {inscribed_radius: 0.5, inflation_radius: 1.0, lethal_value: .inf}
 """
 

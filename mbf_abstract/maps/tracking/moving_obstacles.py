@@ -48,10 +48,16 @@ class MovingObstaclesParameters(TrackingParameters, ContactParameters):
     sources: tuple[str, ...] = parameter(
         ..., "Names of the sensors it listens to, each of which must send scans.", dynamic=False
     )
-    min_obstacle_dist: float = parameter(
-        0.0, "Points no farther from the sensor are ignored, such as those of the robot itself.", unit="m", ge=0.0
+    obstacle_min_range: float = parameter(
+        0.0,
+        "Points no farther from the sensor are ignored, such as those of the robot itself.",
+        unit="m",
+        was="min_obstacle_dist",
+        ge=0.0,
     )
-    max_obstacle_dist: float = parameter(8.0, "Points farther from the sensor are ignored.", unit="m", gt=0.0, le=1e3)
+    obstacle_max_range: float = parameter(
+        8.0, "Points farther from the sensor are ignored.", unit="m", was="max_obstacle_dist", gt=0.0, le=1e3
+    )
     static_distance: float = parameter(
         0.15, "Points this near to the static map are part of it.", unit="m", ge=0.0, le=5.0
     )
@@ -173,7 +179,7 @@ class TrackingLayer(MapLayer):
 def _within(scan: RangeScan, limits: MovingObstaclesParameters) -> RangeScan:
     """The hits of a scan whose distances are within the limits."""
     distances = norm(scan.ends - scan.origin) if len(scan.ends) else np.zeros(0)
-    near = scan.hits & (distances > limits.min_obstacle_dist) & (distances <= limits.max_obstacle_dist)
+    near = scan.hits & (distances > limits.obstacle_min_range) & (distances <= limits.obstacle_max_range)
     return RangeScan(scan.source, scan.frame_id, scan.origin, scan.ends[near], scan.hits[near], scan.stamp)
 
 

@@ -99,7 +99,7 @@ def test_f106_obstacle_beyond_the_end_of_the_path_is_ignored(pursuit):
     cells = np.zeros((200, 200), dtype=np.uint8)
     cells[90:110, 115:118] = 254  # 0.75 m ahead, the footprint reaches 0.2 m
     costmap = Costmap(cells, 0.05, -5.0, -5.0)
-    assert first_command(pursuit(costmap, collision_check_time=5.0), straight(0.15), velocity=Twist.planar(0.5)).success
+    assert first_command(pursuit(costmap, check_ahead_time=5.0), straight(0.15), velocity=Twist.planar(0.5)).success
 
 
 def test_obstacle_on_the_path_is_blocked_path_and_says_where(pursuit):

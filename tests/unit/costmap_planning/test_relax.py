@@ -113,7 +113,7 @@ def test_a_controller_tolerates_twice_the_distance_from_its_path_while_relaxed(m
 def test_a_controller_looks_half_as_far_ahead_for_obstacles_while_relaxed(make_plugin):
     cells = np.zeros((60, 60))
     cells[:, 28:30] = 254  # a wall 0.4 m before the front of the robot, which drives 0.5 m in a second
-    controller = make_plugin(RegulatedPurePursuitController, cells, resolution=0.1, collision_check_time=1.0)
+    controller = make_plugin(RegulatedPurePursuitController, cells, resolution=0.1, check_ahead_time=1.0)
     controller.set_plan(Path.from_points([(1.0, 2.0, 0.0), (5.0, 2.0, 0.0)]))
     request = ControlRequest(Pose.planar(2.2, 2.0), Twist.planar(0.5))
     assert controller.compute_velocity_commands(request).outcome == ExePathOutcome.BLOCKED_PATH

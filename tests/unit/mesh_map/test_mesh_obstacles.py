@@ -67,7 +67,7 @@ def test_obstacle_stays_on_its_storey():
 
 
 def test_points_beyond_the_range_limit_are_ignored():
-    mesh = floor_map(max_obstacle_dist=1.5)
+    mesh = floor_map(obstacle_max_range=1.5)
 
     see(mesh, np.vstack([post(1.0, 2.0), post(3.0, 2.0)]), 1.0)
 
@@ -87,7 +87,7 @@ def test_points_at_the_sensor_itself_mark_nothing_and_keep_nothing_from_being_cl
 
 
 def test_points_of_the_robot_itself_are_ignored_up_to_the_least_distance():
-    mesh = floor_map(min_obstacle_dist=0.5)
+    mesh = floor_map(obstacle_min_range=0.5)
     see(mesh, np.vstack([post(0.4, 2.0, 0.4, 0.6), post(2.0, 2.0, 0.4, 0.6)]), 1.0)
     assert mesh.vertices[mesh.layers["seen"].lethal][:, 0].min() > 1.5
 

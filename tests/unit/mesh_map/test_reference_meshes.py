@@ -83,7 +83,7 @@ def reference_chain(file: Path, inscribed_radius: float) -> MeshMap:
         "roughness": {"threshold": 0.8},
         "static_inflation": inflation,
         "obstacle_inflation": inflation,
-        "obstacle": {"robot_height": 0.7, "max_obstacle_dist": 10.0},
+        "obstacle": {"robot_height": 0.7, "obstacle_max_range": 10.0},
     }
     return build_mesh_map(parameters, blocks)
 

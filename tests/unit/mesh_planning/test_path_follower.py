@@ -90,7 +90,7 @@ def test_a_controller_tolerates_twice_the_distance_from_its_path_while_relaxed(m
 
 def test_it_looks_half_as_far_ahead_for_obstacles_while_relaxed(make_plugin, plain, paint):
     walled = paint(plain(), lambda places: np.where(np.abs(places[:, 0] - 3.0) < 0.3, np.inf, 0.0))
-    follower = make_plugin(PathFollower, walled, obstacle_distance=1.5)
+    follower = make_plugin(PathFollower, walled, check_ahead_dist=1.5)
     follower.set_plan(line(0.5, 5.5))
     blocked = command_at(follower, Pose.planar(1.8, 3.0))
     follower.relaxation.grant("relax", Slack(controller_factor=2.0), until=follower.clock.now() + 5.0)

@@ -49,7 +49,7 @@ def test_the_yaw_rate_is_proportional_and_limited_on_both_sides(ready, error):
 def test_it_stops_before_what_appeared_on_its_way_since_the_plan(make_plugin, plain, paint, x, distance, stops):
     mesh_map = plain()
     plan = make_plugin(CVPPlanner, mesh_map).make_plan(PlanRequest(Pose.planar(1, 3), Pose.planar(5, 3)))
-    controller = make_plugin(VectorFieldController, mesh_map, obstacle_distance=distance)
+    controller = make_plugin(VectorFieldController, mesh_map, check_ahead_dist=distance)
     assert controller.set_plan(plan.path)
     paint(mesh_map, lambda places: np.where(np.abs(places[:, 0] - 3.0) < 0.3, np.inf, 0.0))
     result = controller.compute_velocity_commands(ControlRequest(Pose.planar(x, 3), Twist()))

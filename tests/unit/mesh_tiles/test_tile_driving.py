@@ -80,7 +80,7 @@ def test_a_drive_over_three_borders_of_tiles_ends_as_on_the_whole_mesh(folder):
 
 @pytest.mark.parametrize(
     ("controller", "block"),
-    [("path_follower", "follower: {obstacle_distance: 2.7}"), ("mppi", "follower: {batch_size: 100}")],
+    [("path_follower", "follower: {check_ahead_dist: 2.7}"), ("mppi", "follower: {batch_size: 100}")],
 )
 def test_a_controller_for_meshes_drives_from_window_to_window_as_on_the_whole_mesh(folder, controller, block):
     """Windows of 16 m move on every 4 m; the controllers look nearly as far ahead."""

@@ -54,9 +54,9 @@ def test_a_path_that_a_controller_refuses_on_another_window_is_invalid(tiled_hil
 @pytest.mark.parametrize(
     ("more", "refused"),
     [
-        ("controllers: [{name: follower, type: path_follower}]\nfollower: {obstacle_distance: 2.1}\n", ""),
+        ("controllers: [{name: follower, type: path_follower}]\nfollower: {check_ahead_dist: 2.1}\n", ""),
         (
-            "controllers: [{name: follower, type: path_follower}]\nfollower: {obstacle_distance: 4.0}\n",
+            "controllers: [{name: follower, type: path_follower}]\nfollower: {check_ahead_dist: 4.0}\n",
             r"'follower' \(path_follower\): .*expected more than 23.2 m, got 16 m; .* looks 5 m around the robot, "
             "which drives 0 m between updates, and the layers look 0.8 m around a vertex",
         ),
@@ -87,5 +87,5 @@ def test_parameters_with_which_a_controller_looks_beyond_the_window_are_refused_
     with LoopbackSession(pose(places[0])) as session:
         server = serve(session, tmp_path, config(tiled_hills, FOLLOWER))
         with pytest.raises(ValueError, match=r"tiled_map.window: expected more than 24 m, got 16 m"):
-            server.set_plugin_parameters(PluginKind.CONTROLLER, "follower", obstacle_distance=5.0)
-        assert controller_of(server)._inner.parameters.obstacle_distance == 1.0
+            server.set_plugin_parameters(PluginKind.CONTROLLER, "follower", check_ahead_dist=5.0)
+        assert controller_of(server)._inner.parameters.check_ahead_dist == 1.0
