@@ -14,7 +14,7 @@ import numpy as np
 from octree import Column, Octree
 
 from mbf_abstract.config.configuration import Config
-from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.maps.graph.graph_map import GraphMap, GraphMapParameters, IntArray, grid_edges
 from mbf_abstract.maps.graph.graph_server import GraphMapServer
 from mbf_abstract.maps.queries import CellState, PlaceAnswer
@@ -63,11 +63,13 @@ class OctreeMap(GraphMap):
         nodes = self.nodes_at((occupied + 0.5) * self.resolution)
         return nodes[nodes >= 0]
 
-    def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
-        """Forget everything."""
+    def clear_area(
+        self, center: Pose, size: float, layer_names: Iterable[str] | None = None, *, inside: bool = True
+    ) -> list[str]:
+        """Forget all that the square holds, also what was free; ``clear`` asks for an endless one."""
         with self._lock:
-            if cleared := super().clear(layer_names):
-                self.tree = Octree(self.resolution)
+            if cleared := super().clear_area(center, size, layer_names, inside=inside):
+                self.tree.forget((center.x, center.y), 0.5 * size, inside)
         return cleared
 
     def place(self, x: float, y: float, safety_dist: float = 0.0) -> PlaceAnswer:

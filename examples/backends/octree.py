@@ -80,6 +80,23 @@ class Octree:
                 del cubes[child]
             self.levels[level + 1][parent] = value
 
+    def forget(self, center: tuple[float, float], half: float, inside: bool) -> None:
+        """Forget the cubes inside, or outside, a square of side 2 ``half`` [m] as seen from above.
+
+        Large cubes across its sides are split, smallest ones kept.
+        """
+        for level in range(LEVELS - 1, -1, -1):
+            edge = self.resolution * (1 << level)
+            for cube, value in list(self.levels[level].items()):
+                gaps = [abs((cube[axis] + 0.5) * edge - center[axis]) for axis in (0, 1)]
+                within, beyond = max(gaps) + 0.5 * edge <= half, max(gaps) - 0.5 * edge >= half
+                if within or beyond:
+                    if within == inside:
+                        del self.levels[level][cube]
+                elif level > 0:
+                    del self.levels[level][cube]
+                    self.levels[level - 1].update(dict.fromkeys(_children(cube), value))
+
     def columns(self, z_min: float, z_max: float, occupied: bool) -> set[Column]:
         """Columns (x, y) of smallest cubes with an occupied (or: a known) one between two heights [m]."""
         z_low, z_high = math.floor(z_min / self.resolution), math.ceil(z_max / self.resolution) - 1

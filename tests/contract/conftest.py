@@ -155,6 +155,7 @@ COSTMAP = (
 backend: costmap
 planners: [{name: astar, type: astar}]
 controllers: [{name: pursuit, type: regulated_pure_pursuit}]
+refiners: [{name: smoother, type: smoother}]
 global_costmap:
   width: 12.0
   height: 8.0
@@ -203,6 +204,7 @@ MESH = (
 backend: mesh
 planners: [{name: cvp, type: cvp}]
 controllers: [{name: follower, type: path_follower}]
+refiners: [{name: pulling, type: string_pulling}]
 mesh_map:
   mesh_file: floor.ply
 """
@@ -215,6 +217,7 @@ TILES = (
 backend: tiles
 planners: [{name: far, type: tiles.hierarchical}]
 controllers: [{name: follower, type: path_follower}]
+refiners: [{name: pulling, type: string_pulling}]
 tiled_map:
   folder: floor
 """

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from mbf_abstract.geometry import Path
 from mbf_abstract.outcomes import RecoveryOutcome
-from mbf_abstract.plugins import PluginKind
+from mbf_abstract.plugins import PluginKind, RefineResult
 from mbf_abstract.testing import check_map_backend
 from mbf_abstract.testing.conformance import SITUATIONS, ContractBroken
 
@@ -67,6 +68,38 @@ def arrives_wherever_it_is_near(server):
         )
 
 
+def changing_refined_paths(change):
+    """A fault: what every refiner gives is changed, its ``apply_refinement`` aside."""
+
+    def fault(server):
+        for plugin in server.plugins.all_of(PluginKind.REFINER):
+            refiner = plugin.instance
+            refiner.refine = lambda path, token, refine=refiner.refine: change(refine(path, token), path)
+
+    return fault
+
+
+def refines_by_cutting_the_end(server):
+    def shorter(result, path):
+        refined = result.path if isinstance(result, RefineResult) else result
+        return refined[: len(refined) // 2]
+
+    changing_refined_paths(shorter)(server)
+
+
+def refines_by_straight_lines(server):
+    def straight(result, path):
+        return Path.from_poses([path[0], path[-1]])
+
+    changing_refined_paths(straight)(server)
+
+
+def plans_beside_blocked_goals(server):
+    planner = server.plugins.all_of(PluginKind.PLANNER)[0].instance
+    make_plan = planner.make_plan
+    planner.make_plan = lambda request: make_plan(replace(request, dist_tolerance=max(request.dist_tolerance, 0.6)))
+
+
 def keeps_the_radius_of_its_layers(server):
     server.set_footprint = lambda footprint: None
 
@@ -80,6 +113,17 @@ FAULTS = {
         "a_stamp_from_the_future_is_no_sign_of_life",
         "a_scan_of_nothing_but_nan_is_ignored",
     },
+    plans_beside_blocked_goals: {
+        "a_blocked_goal_is_named",
+        "a_goal_where_the_robot_would_touch_something_is_blocked",
+        "a_tolerance_reaches_past_the_border",
+    },
+    refines_by_cutting_the_end: {
+        "a_refined_path_keeps_its_ends_and_is_no_longer",
+        "a_refined_path_costs_no_more",
+        "a_refined_path_stays_in_its_frame",
+    },
+    refines_by_straight_lines: {"a_refined_path_costs_no_more"},
     takes_clearing_for_news: {"a_cleared_map_is_not_driven_on_until_it_sees_again"},
     drives_recoveries_on_silent_maps: {"a_silent_sensor_holds_a_recovery"},
     swallows_unknown_sources: {"an_unknown_source_is_reported_once"},

@@ -201,6 +201,20 @@ def test_eight_equal_cubes_become_one_and_break_again():
     assert [len(cubes) for cubes in tree.levels[:4]] == [8, 7, 0, 0]
 
 
+@pytest.mark.parametrize("inside", [True, False])
+def test_a_square_is_forgotten_also_where_it_cuts_large_cubes(inside):
+    tree = octree().Octree(0.1)
+    cubes = list(np.ndindex(8, 8, 4))
+    for cube in 10 * cubes:
+        tree.update(cube, octree().MISS)
+    assert not tree.levels[0]
+
+    tree.forget((0.3, 0.4), 0.2, inside)
+
+    in_square = {cube for cube in cubes if 1 <= cube[0] < 5 and 2 <= cube[1] < 6}
+    assert {cube for cube in cubes if tree.log_odds(cube) is None} == (in_square if inside else {*cubes} - in_square)
+
+
 def test_what_a_ray_goes_through_is_cleared_and_its_end_is_marked():
     tree = octree().Octree(0.1)
     tree.insert(

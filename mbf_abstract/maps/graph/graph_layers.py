@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 
@@ -62,10 +63,12 @@ class ObstacleLayer(MapLayer):
         """Points (k, 3) [m] that the newest scans hit."""
         return np.concatenate([np.zeros((0, 3)), *(scan.points for scan in self._newest.values())])
 
-    def clear(self) -> None:
-        """Forget the scans."""
+    def clear_area(self, center: FloatArray, size: float, inside: bool) -> None:
+        """Forget what was hit inside, or outside, a square of side ``size`` [m] around a place (2,), from above."""
         self._waiting.clear()
-        self._newest.clear()
+        for source, scan in self._newest.items():
+            within = (np.abs(scan.ends[:, :2] - center) <= 0.5 * size).all(axis=1)
+            self._newest[source] = replace(scan, hits=scan.hits & (within != inside))
         for watch in self._watches.values():
             watch.cleared()
 

@@ -9,6 +9,7 @@ Cost: one tree query of all nodes an update, about 5 ms for 10,000.
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -119,10 +120,16 @@ class GraphMap(LayeredMap, DiscMap):
 
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
         """Remove what sensors have marked; the map is stale until the next scan of each sensor."""
+        return self.clear_area(Pose.planar(0.0, 0.0), math.inf, layer_names)
+
+    def clear_area(
+        self, center: Pose, size: float, layer_names: Iterable[str] | None = None, *, inside: bool = True
+    ) -> list[str]:
+        """Do the same inside, or outside, a square of side ``size`` [m] around a pose."""
         cleared = [layer for layer in self.layers.chosen(layer_names) if layer is self.obstacles]
         with self._lock:
             for layer in cleared:
-                layer.clear()
+                layer.clear_area(np.array(center.position[:2]), size, inside)
             self._outdated = True
         return [layer.name for layer in cleared]
 

@@ -24,6 +24,7 @@ from mbf_abstract.testing.conformance import (
     freshness,
     planning,
     recovering,
+    refining,
     sensing,
     touching,
 )
@@ -42,6 +43,7 @@ _PARTS: tuple[ModuleType, ...] = (
     freshness,
     asking,
     recovering,
+    refining,
     changing,
 )
 

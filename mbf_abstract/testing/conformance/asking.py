@@ -7,16 +7,16 @@ import math
 from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.queries import CellState, PlaceQuery
-from mbf_abstract.testing.conformance.planning import FACE, WALL
-from mbf_abstract.testing.conformance.rig import T_map_dock
+from mbf_abstract.testing.conformance.planning import FACE, NEAR, WALL
+from mbf_abstract.testing.conformance.rig import Box, T_map_dock
 from mbf_abstract.testing.conformance.site import Site, situation, somewhere
 
-NEAR = somewhere(3.85, 4.0)
-"""A place from which a robot would touch the wall."""
 BESIDE = somewhere(3.65, 4.0)
 """A place from which it would not, but from ahead of it, below the robot."""
 AWAY = somewhere(3.2, 4.0)
 """A place from which it would not."""
+ABREAST = somewhere(2.0, 5.0)
+"""A place one metre to the left of the robot."""
 
 
 @situation()
@@ -126,3 +126,17 @@ def a_cleared_map_has_forgotten(site: Site) -> None:
     site.expect_free(FACE)
     site.sees(site.ray(2.0, 4.0, hit=True))
     site.expect_state(FACE, CellState.LETHAL)
+
+
+@situation()
+def a_cleared_area_has_forgotten(site: Site) -> None:
+    """clear_area removes what sensors have marked in a square around the robot, or all outside it, and nothing else."""
+    for inside in (True, False):
+        site.rig.sensing = True
+        site.place(WALL, Box(1.8, 5.0, 2.2, 5.2))
+        site.expect_state(ABREAST, CellState.LETHAL)
+        site.rig.sensing = False
+        site.server.queries.clear_area(3.0, inside=inside)
+        site.expect_free(ABREAST if inside else FACE)
+        site.expect_state(FACE if inside else ABREAST, CellState.LETHAL)
+    site.expect_raises(ValueError, lambda: site.server.queries.clear_area(0.0), "an area of 0 m")

@@ -52,9 +52,10 @@ def a_silent_sensor_holds_a_recovery(site: Site) -> None:
 
 @situation(controller_patience=20.0)
 def a_cleared_map_is_not_driven_on_until_it_sees_again(site: Site) -> None:
-    """After clearing, by query or by recovery, the robot stands until a scan is in the map again."""
+    """After clearing all or the surroundings, by query or by recovery, the robot stands until a scan is in the map."""
     site.place(WALL)
-    for clear in (site.server.queries.clear_map, lambda: site.navigator.recover("clear")):
+    queries = site.server.queries
+    for clear in (queries.clear_map, lambda: queries.clear_area(5.0), lambda: site.navigator.recover("clear")):
         site.rig.sensing = False
         clear()
         site.expect(bool(site.server.map_problem()), "a map that has forgotten what it saw counts as current")

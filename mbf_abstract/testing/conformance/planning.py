@@ -15,6 +15,10 @@ from mbf_abstract.testing.conformance.site import Site, situation, somewhere
 WALL = Box(4.0, 3.5, 4.4, 4.5)
 FACE = somewhere(4.0, 4.0)
 """Where the sensor sees the wall first."""
+NEAR = somewhere(3.85, 4.0)
+"""A place from which a robot would touch the wall."""
+BEYOND = somewhere(3.5, 4.0)
+"""A place half a metre before the wall, which the coarsest map still takes for free."""
 CAGE = (Box(0.6, 2.6, 3.4, 2.8), Box(0.6, 5.2, 3.4, 5.4), Box(0.6, 2.6, 0.8, 5.4), Box(3.2, 2.6, 3.4, 5.4))
 """Four walls around the robot's start, 1.2 m away."""
 
@@ -63,6 +67,25 @@ def a_blocked_goal_is_named(site: Site) -> None:
     """A goal on an obstacle ends with BLOCKED_GOAL if the path must end exactly there."""
     site.place(WALL)
     site.expect_outcome(site.navigator.get_path(FACE, dist_tolerance=0.0), GetPathOutcome.BLOCKED_GOAL, "goal (4.00")
+
+
+@situation()
+def a_goal_where_the_robot_would_touch_something_is_blocked(site: Site) -> None:
+    """A goal nearer to an obstacle than the robot's radius ends with BLOCKED_GOAL.
+
+    With a tolerance the path ends where the robot touches nothing. A goal just beyond the radius is reached.
+    """
+    site.place(WALL)
+    site.expect_outcome(site.navigator.get_path(NEAR, dist_tolerance=0.0), GetPathOutcome.BLOCKED_GOAL)
+    plan = site.navigator.get_path(NEAR, dist_tolerance=0.6)
+    site.expect_outcome(plan, GetPathOutcome.SUCCESS)
+    end = _end(plan.path, NEAR.x, NEAR.y)
+    site.expect(end <= 0.6, f"the path ends {end:.2f} m from the goal, allowed is 0.6 m")
+    if plan.path is not None:
+        state = site.server.queries.check_pose(plan.path[-1]).state
+        site.expect(state <= CellState.INSCRIBED, f"check_pose returns {state.name} where the path ends")
+    beyond = site.navigator.get_path(BEYOND, dist_tolerance=0.0)
+    site.expect_outcome(beyond, GetPathOutcome.SUCCESS)
 
 
 @situation()

@@ -140,7 +140,7 @@ class MakeServer(Protocol):
     The server of ``rig`` on flat, empty, known ground of 12 m x 8 m for a robot of 0.3 m radius, with ``parameters`` at
     the top level of its configuration. It takes scans of the source ``lidar`` and has at least one planner, one
     controller, and the recoveries ``wait``, ``rotate``, ``back_up``, ``clear``, ``relax`` and ``move_away`` under these
-    names.
+    names; where the map has refiners, all of them.
     """
 
     def __call__(self, rig: BackendRig, **parameters: Any) -> MapServer:
