@@ -148,7 +148,8 @@ class CostmapNavigationServer(MapServer):
         try:
             content = load_map(file).axis_aligned()
         except MapError as error:
-            raise ConfigError([Finding(str(error.file), 1, "", "a map", error.reason)]) from error
+            found = error.findings or [Finding(str(error.file), 1, "", "a map", error.reason)]
+            raise ConfigError(found) from error
         return FloorMap(content.occupancy, content.resolution, *content.origin[:2])
 
     def _serve(self, config: Config, key: str, static_maps: StaticMaps) -> ServedMap[LayeredCostmap]:

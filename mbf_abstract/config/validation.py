@@ -34,9 +34,11 @@ _EXPECTED = {
     "path_not_file": "a file that exists",
     "path_not_directory": "a folder that exists",
     "missing": "a value",
+    "bool_parsing": "true or false",
 }
 _NUMBER_ERRORS = {
     "float_type",
+    "float_parsing",
     "int_type",
     "int_from_float",
     "finite_number",
@@ -79,7 +81,7 @@ def validate(
     try:
         return model.model_validate_json(json.dumps(block, default=str), strict=True, context=context)
     except ValidationError as error:
-        findings.extend(_findings_of(model, block, error.errors(include_url=False), document, key_path))
+        findings.extend(findings_of(model, block, error.errors(include_url=False), document, key_path))
         return None
 
 
@@ -93,12 +95,13 @@ def describe_range(field: FieldInfo) -> str:
     return " ".join(part for part in (" and ".join(bounds), unit) if part)
 
 
-def _findings_of(
-    model: type[ParameterModel], block: object, errors: list[ErrorDetails], document: YamlDocument, key_path: KeyPath
+def findings_of(
+    model: type[BaseModel], block: object, errors: list[ErrorDetails], document: YamlDocument, key_path: KeyPath
 ) -> list[Finding]:
-    """One finding per key: the alternatives of a union, which pydantic reports one by one, are joined by "or".
+    """Return one finding for each key of which pydantic has reported errors.
 
-    What is wrong inside one alternative goes before that the whole is no other one.
+    The alternatives of a union, which it reports one by one, are joined by "or". What is wrong inside one alternative
+    goes before that the whole is no other one.
     """
     found: dict[KeyPath, Finding] = {}
     for error in errors:
@@ -114,7 +117,7 @@ def _findings_of(
 
 
 def _finding_of(
-    model: type[ParameterModel], error: ErrorDetails, loc: KeyPath, document: YamlDocument, key_path: KeyPath
+    model: type[BaseModel], error: ErrorDetails, loc: KeyPath, document: YamlDocument, key_path: KeyPath
 ) -> Finding:
     path = (*key_path, *loc)
     if error["type"] == "extra_forbidden":
@@ -124,7 +127,7 @@ def _finding_of(
     return document.finding(path, _expected(model, error, loc), got)
 
 
-def _expected(model: type[ParameterModel], error: ErrorDetails, loc: KeyPath) -> str:
+def _expected(model: type[BaseModel], error: ErrorDetails, loc: KeyPath) -> str:
     field = _field_at(model, loc)
     limits = describe_range(field) if field is not None else ""
     if error["type"] in _NUMBER_ERRORS:

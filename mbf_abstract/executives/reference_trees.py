@@ -230,7 +230,7 @@ def _recoveries(*behaviors: str) -> list[Behaviour]:
     return [Recovery(behavior) for behavior in behaviors if behavior]
 
 
-READY_TREES: dict[str, Callable[..., Behaviour]] = {
+REFERENCE_TREES: dict[str, Callable[..., Behaviour]] = {
     "control": control_tree,
     "navigation": navigation_tree,
     "planning": planning_tree,

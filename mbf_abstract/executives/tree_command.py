@@ -19,9 +19,9 @@ def register(app: typer.Typer) -> None:
 
 def list_trees() -> None:
     """List the trees that come with the package."""
-    from mbf_abstract.executives.reference_trees import READY_TREES
+    from mbf_abstract.executives.reference_trees import REFERENCE_TREES
 
-    for name, make in READY_TREES.items():
+    for name, make in REFERENCE_TREES.items():
         typer.echo(f"{name:12} {(make.__doc__ or '').splitlines()[0]}")
 
 
@@ -32,14 +32,14 @@ def show(
 ) -> None:
     """Draw a tree."""
     with readable_errors():
-        from mbf_abstract.executives.reference_trees import READY_TREES
+        from mbf_abstract.executives.reference_trees import REFERENCE_TREES
         from mbf_abstract.executives.tree_drawing import FORMATS, draw_tree
 
-        if name not in READY_TREES:
-            raise typer.BadParameter(f"expected one of {', '.join(READY_TREES)}, got {name!r}", param_hint="NAME")
+        if name not in REFERENCE_TREES:
+            raise typer.BadParameter(f"expected one of {', '.join(REFERENCE_TREES)}, got {name!r}", param_hint="NAME")
         if form not in FORMATS:
             raise typer.BadParameter(f"expected one of {', '.join(FORMATS)}, got {form!r}", param_hint="--format")
-        drawing = draw_tree(READY_TREES[name](), form)
+        drawing = draw_tree(REFERENCE_TREES[name](), form)
         if out is None:
             typer.echo(drawing, nl=False)
         else:

@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from mbf_abstract.config.findings import ConfigError, Finding, describe_value
+from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.validation import findings_of
 from mbf_abstract.config.yaml_source import YamlDocument, load_yaml
+from mbf_abstract.parameters import parameter
 
 OccupancyArray = NDArray[np.uint8]
 
@@ -30,16 +32,17 @@ REPORTED_WIDTH = 300
 
 
 class MapError(Exception):
-    """A map file that cannot be used."""
+    """A map file that cannot be used; ``findings`` are those of a YAML file, which ``reason`` sums up."""
 
-    def __init__(self, file: Path, reason: str) -> None:
+    def __init__(self, file: Path, reason: str, findings: Sequence[Finding] = ()) -> None:
         super().__init__(f"{file}: {reason}")
         self.file = file
         self.reason = reason
+        self.findings = tuple(findings)
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         """Support pickling, for errors raised in worker processes."""
-        return type(self), (self.file, self.reason)
+        return type(self), (self.file, self.reason, self.findings)
 
 
 class MapMode(str, Enum):
@@ -56,7 +59,7 @@ class MapDescription(BaseModel):
     model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
 
     image: str = Field(min_length=1)
-    resolution: float = Field(ge=1e-4, le=1e3)
+    resolution: float = parameter(..., "Edge of a cell.", unit="m", ge=1e-4, le=1e3)
     origin: tuple[float, float, float]
     negate: bool = False
     occupied_thresh: float = Field(0.65, ge=0.0, le=1.0)
@@ -118,7 +121,7 @@ def read_mapping(file: Path) -> YamlDocument:
     try:
         return load_yaml(file)
     except ConfigError as error:
-        raise MapError(file, findings_text(error.findings)) from error
+        raise MapError(file, findings_text(error.findings), error.findings) from error
 
 
 def validated_description(
@@ -129,15 +132,8 @@ def validated_description(
         return MapDescription.model_validate(keys)
     except ValidationError as error:
         source = document or YamlDocument(file, {})
-        findings = [
-            source.finding(
-                one["loc"],
-                one["msg"].removeprefix("Value error, ").removeprefix("Input should be "),
-                "nothing" if one["type"] == "missing" else describe_value(one["input"]),
-            )
-            for one in error.errors(include_url=False)
-        ]
-        raise MapError(file, findings_text(findings)) from error
+        findings = findings_of(MapDescription, keys, error.errors(include_url=False), source, ())
+        raise MapError(file, findings_text(findings), findings) from error
 
 
 def findings_text(findings: Sequence[Finding]) -> str:

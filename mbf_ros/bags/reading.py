@@ -182,4 +182,4 @@ def _by_field_name(value: Any, store: Any) -> Any:
 
 
 def _reason(error: Exception) -> str:
-    return error_text(error) or type(error).__name__
+    return error_text(error).rstrip(".") or type(error).__name__

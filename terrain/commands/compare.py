@@ -19,7 +19,7 @@ def compare(
 ) -> None:
     """Compare runs: a table of their metrics in the terminal, and one page with everything."""
     if len(folders) < 2:
-        raise typer.BadParameter("expected two or more folders", param_hint="DIR DIR...")
+        raise typer.BadParameter(f"expected two or more folders, got {len(folders)}", param_hint="DIR DIR...")
     with readable_errors():
         from rich.console import Console
         from rich.markup import escape

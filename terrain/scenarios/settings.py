@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from pydantic import ValidationError
 
 from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.validation import validate
+from mbf_abstract.config.yaml_source import YamlDocument
 from terrain.scenarios.scenario import Scenario
 
 WORLD = "world."
@@ -34,13 +35,11 @@ def apply_world_settings(scenario: Scenario, settings: Mapping[str, str]) -> tup
         return scenario, dict(settings)
     kept = scenario.world.model_dump(exclude_unset=True)
     changed = kept | {key.removeprefix(WORLD): value for key, value in of_world.items()}
-    try:
-        world = type(scenario.world).model_validate(changed)
-    except ValidationError as error:
-        wrong = [(".".join(map(str, detail["loc"])), detail["msg"]) for detail in error.errors()]
-        raise ConfigError(
-            [Finding("settings", 1, f"{WORLD}{key}", text, repr(changed.get(key))) for key, text in wrong]
-        ) from error
+    findings: list[Finding] = []
+    document = YamlDocument(Path("settings"), {"world": changed})
+    world = validate(type(scenario.world), changed, document, ("world",), findings)
+    if findings:
+        raise ConfigError(findings)
     rest = {key: value for key, value in settings.items() if key not in of_world}
     return scenario.model_copy(update={"world": world}), rest
 

@@ -18,7 +18,7 @@ from py_trees.composites import Sequence
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.event_values import error_text
-from mbf_abstract.executives.reference_trees import READY_TREES, TreeOptions, control_tree, planning_tree
+from mbf_abstract.executives.reference_trees import REFERENCE_TREES, TreeOptions, control_tree, planning_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive, TreeResult
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import MoveBaseGoal
@@ -30,7 +30,7 @@ from mbf_abstract.plugins import PluginKind
 from terrain.experiments.classic_move_base.settings import ClassicSettings
 from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
 
-EXECUTIVES = ("move_base", "classic", *READY_TREES)
+EXECUTIVES = ("move_base", "classic", *REFERENCE_TREES)
 TreeMaker: TypeAlias = Callable[[TreeOptions], Behaviour]
 """Makes a tree that drives to one goal, with the plugins of the robot."""
 
@@ -81,8 +81,8 @@ def make_executive(executive: str, navigator: Navigator) -> GoalExecutive:
         return GoalExecutive(partial(MoveBaseDrive, navigator))
     if executive == "classic":
         return GoalExecutive(partial(ClassicMoveBase, navigator, ClassicSettings()))
-    if executive in READY_TREES:
-        make_tree = _plan_then_control if executive == "control" else READY_TREES[executive]
+    if executive in REFERENCE_TREES:
+        make_tree = _plan_then_control if executive == "control" else REFERENCE_TREES[executive]
         return GoalExecutive(partial(TreeDrive, navigator, make_tree), arrives=executive != "planning")
     if ":" in executive:
         return GoalExecutive(partial(TreeDrive, navigator, _tree_of(executive)))

@@ -49,6 +49,22 @@ def test_a_file_that_is_no_mapping_is_refused(tmp_path, text):
         load_map(tmp_path / "map.yaml")
 
 
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("origin: [0, 0, 0]", "resolution: expected a value >= 0.0001 and <= 1000 m, got nothing"),
+        ("resolution: x", "resolution: expected a number >= 0.0001 and <= 1000 m, got 'x'"),
+        ("negate: maybe", "negate: expected true or false, got 'maybe'"),
+    ],
+)
+def test_a_wrong_key_is_named_with_what_was_expected(tmp_path, text, reason):
+    (tmp_path / "map.yaml").write_text(f"image: map.pgm\n{text}\n")
+    with pytest.raises(MapError) as caught:
+        load_map(tmp_path / "map.yaml")
+    assert reason in str(caught.value)
+    assert reason in "\n".join(finding.text for finding in caught.value.findings)
+
+
 NASTY = {
     "a date with month 99": ("foo: 2001-99-99", "line 4: foo: expected a plain value"),
     "a number of 5000 digits": ("foo: " + "9" * 5000, "line 4: foo"),

@@ -63,5 +63,5 @@ def test_the_message_for_a_scenario_that_leaves_a_map_far_from_zero_names_what_t
 def test_a_file_that_is_no_map_is_a_finding(tmp_path):
     (tmp_path / "map.yaml").write_text("image: missing.png\n")
 
-    with pytest.raises(ConfigError, match=r"map\.yaml"):
+    with pytest.raises(ConfigError, match=r"map\.yaml:1: resolution: expected a value >= 0\.0001 and <= 1000 m"):
         on_map(load_scenario("indoor"), tmp_path / "map.yaml")

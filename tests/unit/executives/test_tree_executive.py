@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from mbf_abstract.events import EventKind
 from mbf_abstract.executives.conditions import Do
 from mbf_abstract.executives.leaves import ExePath, GetPath, MoveBase, Recovery
-from mbf_abstract.executives.reference_trees import READY_TREES, TreeOptions, navigation_tree
+from mbf_abstract.executives.reference_trees import REFERENCE_TREES, TreeOptions, navigation_tree
 from mbf_abstract.executives.state_machine import State, StateMachine
 from mbf_abstract.executives.tree_command import register
 from mbf_abstract.executives.tree_drawing import as_dot, as_svg, as_text, draw_tree
@@ -185,9 +185,9 @@ def test_a_period_must_be_positive(make_session):
 
 
 # ----------------------------------------------------------------------------------------------------- drawing
-@pytest.mark.parametrize("name", sorted(READY_TREES))
+@pytest.mark.parametrize("name", sorted(REFERENCE_TREES))
 def test_every_drawing_shows_every_node(name):
-    tree = READY_TREES[name]()
+    tree = REFERENCE_TREES[name]()
     names = sorted(node.name for node in tree.iterate())
     svg = ElementTree.fromstring(as_svg(tree))
     boxes = [text.text.rsplit(" (", 1)[0] for text in svg.iter("{http://www.w3.org/2000/svg}text")]
@@ -226,7 +226,7 @@ def test_mbf_tree_shows_and_lists(app, tmp_path):
     file = tmp_path / "tree.svg"
     assert CliRunner().invoke(app, ["tree", "show", "control", "--format", "svg", "--out", str(file)]).exit_code == 0
     assert file.read_text().startswith("<svg")
-    assert all(name in CliRunner().invoke(app, ["tree", "list"]).stdout for name in READY_TREES)
+    assert all(name in CliRunner().invoke(app, ["tree", "list"]).stdout for name in REFERENCE_TREES)
 
 
 @pytest.mark.parametrize("arguments", [["show", "nothing"], ["show", "control", "--format", "png"]])

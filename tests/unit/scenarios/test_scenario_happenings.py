@@ -1,6 +1,7 @@
 """Faults, actors, limits and settings of scenarios."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -176,9 +177,15 @@ def test_a_setting_of_the_world_changes_the_ground_and_is_no_setting_of_the_navi
     assert apply_world_settings(scenario, rest) == (scenario, rest)
 
 
-@pytest.mark.parametrize(("key", "value"), [("world.size", "-3.0"), ("world.colour", "red")])
-def test_a_wrong_setting_of_the_world_is_refused_by_name(key, value):
-    with pytest.raises(ConfigError, match=key):
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    [
+        ("world.size", "-3.0", "expected a number > 1 and <= 1000 m, got -3.0"),
+        ("world.siz", "3.0", "expected a known key, got 'siz' (did you mean 'size'?)"),
+    ],
+)
+def test_a_wrong_setting_of_the_world_is_refused_by_name(key, value, text):
+    with pytest.raises(ConfigError, match=re.escape(f"settings:1: {key}: {text}")):
         apply_world_settings(load_scenario("outdoor"), {key: value})
 
 
