@@ -46,7 +46,7 @@ IN_CI = (SKYLAKE_X if __cpu_features__["AVX512_SKX"] else {}) | {
 
 
 def digests(names, environment, folder):
-    """Digests of the drives in a process of its own."""
+    """Digests and failures of the drives in a process of its own."""
     inherited = {name: value for name, value in os.environ.items() if not name.startswith(("OPENBLAS_", "NPY_"))}
     command = [sys.executable, str(DRIVES), *names]
     done = subprocess.run(command, env=inherited | environment, cwd=folder, capture_output=True, text=True, check=False)
@@ -67,13 +67,13 @@ def names(request):
 
 @pytest.fixture(scope="module")
 def here(names, tmp_path_factory):
-    """Digests on this CPU as it is."""
+    """Digests and failures on this CPU as it is."""
     return digests(names, {}, tmp_path_factory.mktemp("here"))
 
 
 @pytest.fixture(params=[*ENVIRONMENTS, *(IN_CI if EVERYTHING else ())])
 def elsewhere(request, names, tmp_path):
-    """Digests in another environment."""
+    """Digests and failures in another environment."""
     environment = {**ENVIRONMENTS, **IN_CI}[request.param]
     if "NUMBA_CPU_NAME" in environment:
         environment = environment | {"NUMBA_CACHE_DIR": str(tmp_path / "kernels")}

@@ -1,8 +1,8 @@
-"""Drives, a sweep and legs of Table I, each with the SHA-256 of all that its robot did.
+"""Drives, a sweep and legs of Table I, each with the SHA-256 of all that its robot did and why it did not succeed.
 
     python tests/determinism/drives.py indoor switchback table1/B sweep
 
-prints one JSON object, name -> digest. Run it under other environments (``conftest.py`` does) and compare.
+prints one JSON object, name -> [digest, failure]. Run it under other environments (``conftest.py`` does) and compare.
 """
 
 import hashlib
@@ -21,11 +21,11 @@ TABLE_1 = "table1/"
 SWEEP = "sweep"
 
 
-def drive(name: str, seed: int | None = None) -> str:
-    """Digest of the shipped scenario ``name``, its outcome included."""
+def drive(name: str, seed: int | None = None) -> tuple[str, str]:
+    """Digest of the shipped scenario ``name``, its outcome included; its verdict unless it has succeeded, else ""."""
     with tempfile.TemporaryDirectory() as folder:
         result = run_scenario(load_scenario(name), RunOptions(Path(folder), seed=seed))
-    return f"{result.metrics['digest']}"
+    return f"{result.metrics['digest']}", "" if result.success else f"{result.verdict}"
 
 
 def table_1_leg(condition: str) -> str:
@@ -36,15 +36,15 @@ def table_1_leg(condition: str) -> str:
 
 def sweep() -> str:
     """Digest of three seeds of a scenario with noise, as a sweep runs them."""
-    return hashlib.sha256("".join(drive("post_forest", seed) for seed in (1, 2, 3)).encode()).hexdigest()
+    return hashlib.sha256("".join(drive("post_forest", seed)[0] for seed in (1, 2, 3)).encode()).hexdigest()
 
 
-def digest_of(name: str) -> str:
-    """Digest of a shipped scenario, ``table1/CONDITION`` or ``sweep``."""
+def driven(name: str) -> tuple[str, str]:
+    """Digest and failure of a shipped scenario; of ``table1/CONDITION`` and ``sweep`` the digest alone."""
     if name == SWEEP:
-        return sweep()
-    return table_1_leg(name.removeprefix(TABLE_1)) if name.startswith(TABLE_1) else drive(name)
+        return sweep(), ""
+    return (table_1_leg(name.removeprefix(TABLE_1)), "") if name.startswith(TABLE_1) else drive(name)
 
 
 if __name__ == "__main__":
-    sys.stdout.write(json.dumps({name: digest_of(name) for name in sys.argv[1:]}) + "\n")
+    sys.stdout.write(json.dumps({name: driven(name) for name in sys.argv[1:]}) + "\n")

@@ -36,8 +36,30 @@ NEAR = Path.from_points([(0.0, 0.0, 0.0), (0.2, 0.0, 0.0)])
 FAR = Path.from_points([(0.0, 0.0, 0.0), (50.0, 0.0, 0.0)])
 
 
+def one_of(rng, options):
+    """The option that ``rng.choice`` would draw, at a tenth of its cost."""
+    return options[int(rng.integers(len(options)))]
+
+
+def drawn(rng, bounds):
+    """An index, drawn with the probabilities whose sums are ``bounds``, as by ``rng.choice``."""
+    return int(bounds.searchsorted(rng.random(), side="right"))
+
+
+def sums(*probabilities):
+    added = np.cumsum(probabilities)
+    return added / added[-1]
+
+
+PLANNER_ANSWERS = sums(0.4, 0.1, 0.2, 0.2, 0.05, 0.05)
+CONTROLLER_ANSWERS = sums(0.5, 0.15, 0.1, 0.1, 0.05, 0.05, 0.05)
+RECOVERY_ANSWERS = sums(0.5, 0.2, 0.2, 0.1)
+GOALS = sums(0.15, 0.3, 0.1, 0.35, 0.1)
+ACTS = sums(0.45, 0.2, 0.2, 0.06, 0.06, 0.03)
+
+
 def planner_answer(rng, clock):
-    seconds = float(rng.choice([0.0, 0.03, 0.2]))
+    seconds = one_of(rng, (0.0, 0.03, 0.2))
     failure = PlanResult(GetPathOutcome.NO_PATH_FOUND, "no")
     return [
         straight_plan,
@@ -46,7 +68,7 @@ def planner_answer(rng, clock):
         obedient(clock, seconds, straight_plan, PlanResult(GetPathOutcome.CANCELED, "as ordered")),
         RuntimeError("planner"),
         slow(clock, 1.5, failure),  # longer than patience and grace: quarantined for a while
-    ][int(rng.choice(6, p=[0.4, 0.1, 0.2, 0.2, 0.05, 0.05]))]
+    ][drawn(rng, PLANNER_ANSWERS)]
 
 
 def controller_answer(rng, clock, controller):
@@ -55,11 +77,11 @@ def controller_answer(rng, clock, controller):
         controller.follow,
         drive(0.3),
         failure,
-        slow(clock, float(rng.choice([0.02, 0.2])), drive(0.2)),
+        slow(clock, one_of(rng, (0.02, 0.2)), drive(0.2)),
         RuntimeError("controller"),
         ControlResult(ExePathOutcome.CANCELED, "enough"),
         slow(clock, 1.5, drive(2.0)),
-    ][int(rng.choice(7, p=[0.5, 0.15, 0.1, 0.1, 0.05, 0.05, 0.05]))]
+    ][drawn(rng, CONTROLLER_ANSWERS)]
 
 
 def recovery_answer(rng, clock):
@@ -69,7 +91,7 @@ def recovery_answer(rng, clock):
         return RecoveryResult(RecoveryOutcome.CANCELED if ended else 0, "")
 
     return [drives, RecoveryResult(0, ""), RecoveryResult(RecoveryOutcome.FAILURE, ""), RuntimeError("recovery")][
-        int(rng.choice(4, p=[0.5, 0.2, 0.2, 0.1]))
+        drawn(rng, RECOVERY_ANSWERS)
     ]
 
 
@@ -83,21 +105,21 @@ def prepare(session, rng):
 
 
 def random_goal(rng):
-    controller = str(rng.choice(["", "controller", "other"]))
+    controller = one_of(rng, ("", "controller", "other"))
     slot = int(rng.integers(2))
     return [
         GetPathGoal(Pose.planar(2.0, 0.0), concurrency_slot=slot),
         ExePathGoal(NEAR if rng.random() < 0.5 else FAR, controller=controller),
         RecoveryGoal(concurrency_slot=slot),
-        MoveBaseGoal(Pose.planar(float(rng.choice([0.2, 50.0])), 0.0), controller=controller),
+        MoveBaseGoal(Pose.planar(one_of(rng, (0.2, 50.0)), 0.0), controller=controller),
         FollowWaypointsGoal((Pose.planar(0.2, 0.0), Pose.planar(0.0, 0.0)), stop_on_failure=bool(rng.random() < 0.5)),
-    ][int(rng.choice(5, p=[0.15, 0.3, 0.1, 0.35, 0.1]))]
+    ][drawn(rng, GOALS)]
 
 
 def client(session, rng, handles, steps):
     """One client: sends, cancels, pauses and resumes at random moments."""
     for _ in range(steps):
-        session.clock.sleep(float(rng.choice([0.0, 0.0, 0.01, 0.05, 0.1, 0.3])))
+        session.clock.sleep(one_of(rng, (0.0, 0.0, 0.01, 0.05, 0.1, 0.3)))
         act = rng.random()
         if act < 0.45 or not handles:
             handles.append(session.navigator.send(random_goal(rng)))
@@ -105,7 +127,7 @@ def client(session, rng, handles, steps):
         else:
             handle, server = handles[int(rng.integers(len(handles)))], session.server
             acts = [handle.cancel, handle.pause, handle.resume, server.pause_all, server.resume_all, server.cancel_all]
-            acts[int(rng.choice(6, p=[0.45, 0.2, 0.2, 0.06, 0.06, 0.03]))]()
+            acts[drawn(rng, ACTS)]()
 
 
 def run_schedule(seed):
@@ -118,9 +140,9 @@ def run_schedule(seed):
         controller_patience=0.5,
         recovery_patience=0.5,
         cancel_grace=0.3,
-        oscillation_timeout=float(rng.choice([0.0, 0.6])),
-        planner_frequency=float(rng.choice([0.0, 5.0])),
-        replan_failed_policy=str(rng.choice(["keep", "stop", "recover"])),
+        oscillation_timeout=one_of(rng, (0.0, 0.6)),
+        planner_frequency=one_of(rng, (0.0, 5.0)),
+        replan_failed_policy=one_of(rng, ("keep", "stop", "recover")),
         max_quarantined=100,
         controller_frequency=10.0,
     )
