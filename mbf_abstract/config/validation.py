@@ -123,8 +123,18 @@ def _finding_of(
     if error["type"] == "extra_forbidden":
         hint = _key_hint(str(loc[-1]), _fields_at(model, loc[:-1]))
         return document.finding(path, "a known key", repr(loc[-1]), hint)
+    if error["type"].startswith("union_tag"):
+        return _finding_of_tag(error, document, path)
     got = "nothing" if error["type"] == "missing" else describe_value(error["input"])
     return document.finding(path, _expected(model, error, loc), got)
+
+
+def _finding_of_tag(error: ErrorDetails, document: YamlDocument, path: KeyPath) -> Finding:
+    """A block whose key that says what it is has none of the known values, or is missing."""
+    tags = error["ctx"].get("expected_tags", "")
+    got = repr(error["ctx"]["tag"]) if tags else "nothing"
+    key = error["ctx"]["discriminator"].strip("'")
+    return document.finding((*path, key), f"one of {tags}" if tags else "a value", got)
 
 
 def _expected(model: type[BaseModel], error: ErrorDetails, loc: KeyPath) -> str:

@@ -51,7 +51,7 @@ def replay(
     """
     place = parse_place(goal, "--goal") if goal else None
     if place is None and (math.isfinite(at) or planner):
-        raise typer.BadParameter("needs a goal", param_hint="--at" if math.isfinite(at) else "--planner")
+        raise typer.BadParameter("it goes with --goal only", param_hint="--at" if math.isfinite(at) else "--planner")
     with readable_errors():
         from mbf_abstract.drive_log import write_drive_log
         from mbf_abstract.server.factory import read_config

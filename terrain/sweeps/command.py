@@ -107,8 +107,8 @@ def _print_tables(console: Console, rows: list[dict[str, Any]]) -> None:
         console.print(tests)
 
 
-def parse_seeds(text: str) -> list[int]:
-    """Return the seeds of ``0:20`` or ``1,5,9``."""
+def parse_seeds(text: str, option: str = "--seeds") -> list[int]:
+    """Return the numbers of ``0:20`` or ``1,5,9``; ``option`` is named where they are wrong."""
     try:
         if ":" in text:
             first, end = text.split(":")
@@ -118,7 +118,9 @@ def parse_seeds(text: str) -> list[int]:
     except ValueError:
         seeds = []
     if not seeds or min(seeds) < 0 or len(set(seeds)) < len(seeds):
-        raise typer.BadParameter(f"expected 0:20 or 1,5,9, each seed once and none below 0, got {text!r}")
+        raise typer.BadParameter(
+            f"expected 0:20 or 1,5,9, each number once and none below 0, got {text!r}", param_hint=option
+        )
     return seeds
 
 
@@ -128,6 +130,6 @@ def parse_settings(texts: list[str]) -> dict[str, list[str]]:
     for text in texts:
         key, _, values = text.partition("=")
         if not key or not all(values.split(",")):
-            raise typer.BadParameter(f"expected KEY=VALUE,VALUE, got {text!r}")
+            raise typer.BadParameter(f"expected KEY=VALUE,VALUE, got {text!r}", param_hint="--set")
         settings[key] = values.split(",")
     return settings

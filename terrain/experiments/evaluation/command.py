@@ -146,7 +146,7 @@ def _seeds(text: str, quick: bool) -> list[int]:
 def _levels(text: str) -> list[int]:
     from terrain.sweeps.command import parse_seeds
 
-    levels = parse_seeds(text)
+    levels = parse_seeds(text, "--levels")
     if max(levels) >= MOST_LEVELS:
         raise typer.BadParameter(f"expected levels from 0 to {MOST_LEVELS - 1}, got {text!r}", param_hint="--levels")
     return levels

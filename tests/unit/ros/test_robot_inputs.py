@@ -94,7 +94,7 @@ def test_a_goal_is_sent_unless_there_is_a_refusal():
     assert [(one.target_pose.x, one.target_pose.frame_id, one.target_pose.stamp) for one in sent] == [
         (2.0, "map", 0.0)
     ] * 2
-    reasons[0] = "the node ends"
-    with pytest.raises(MessageError, match="the node ends"):
+    reasons[0] = "the node is shutting down"
+    with pytest.raises(MessageError, match="the node is shutting down"):
         takers[0].take(goal)
     assert len(sent) == 2

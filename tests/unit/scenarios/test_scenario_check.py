@@ -129,6 +129,18 @@ def test_a_footprint_that_does_not_hold_the_robot_is_noted(of_mesh, of_costmaps,
     assert [f"{name}: {radius} {own}, {of_robot}" for name, radius, own, of_robot in said] == notes
 
 
+@pytest.mark.parametrize(
+    ("world", "mistake"),
+    [
+        ("{type: moon}", r"world\.type: expected one of 'jacksboro', 'generated', .*, got 'moon'"),
+        ("{}", r"world\.type: expected a value, got nothing"),
+    ],
+)
+def test_a_world_of_an_unknown_type_is_named_with_the_types_there_are(world, mistake, tmp_path):
+    report = check_scenario(load_yaml(write(tmp_path, [("trial.yaml", "world", world, "")])), load=False)
+    assert re.search(mistake, report.findings[0].text)
+
+
 @pytest.mark.parametrize("size", ["[0.6, -0.8, 0.6]", "[0.0, 0.5, 1.0]"])
 def test_an_obstacle_without_extent_is_a_mistake(size, tmp_path):
     obstacles = f"[{{x: 3.0, y: 2.5, size: {size}}}]"

@@ -198,12 +198,14 @@ def test_seeds_are_a_range_or_a_list(text, seeds):
 
 @pytest.mark.parametrize("text", ["", "3:3", "a", "1,1", "-1,2", "1:2:3"])
 def test_nonsense_for_seeds_is_refused(text):
-    with pytest.raises(typer.BadParameter):
-        parse_seeds(text)
+    with pytest.raises(typer.BadParameter, match="expected 0:20 or 1,5,9") as refused:
+        parse_seeds(text, "--levels")
+    assert refused.value.param_hint == "--levels"
 
 
 def test_settings_list_their_values_and_nonsense_is_refused():
     assert parse_settings(["planner=cvp,astar", "a.b=1"]) == {"planner": ["cvp", "astar"], "a.b": ["1"]}
     for text in ("planner", "=1", "planner=", "planner=a,"):
-        with pytest.raises(typer.BadParameter):
+        with pytest.raises(typer.BadParameter) as refused:
             parse_settings([text])
+        assert refused.value.param_hint == "--set"
