@@ -133,7 +133,7 @@ def read_elevation(path: str | Path, max_samples: int = MAX_SAMPLES) -> Elevatio
     readers |= {".tif": _read_geotiff, ".tiff": _read_geotiff}
     reader = readers.get(path.suffix.lower())
     if reader is None:
-        raise TerrainFileError(path, f"unknown ending '{path.suffix}', known are: {', '.join(sorted(readers))}")
+        raise TerrainFileError(path, f"unknown ending '{path.suffix}'; known: {', '.join(sorted(readers))}")
     if not path.is_file():
         raise TerrainFileError(path, "there is no such file")
     try:

@@ -94,7 +94,7 @@ def _read_header(path: Path, file: BinaryIO) -> tuple[str, list[_Element]]:
     except (LookupError, ValueError) as error:
         raise MeshError(str(path), [f"its header has a line that is not PLY: {' '.join(words)!r:.80}"]) from error
     if form != "ascii" and form not in BYTE_ORDERS:
-        raise MeshError(str(path), [f"unknown format {form!r:.40}, known are: ascii, {', '.join(BYTE_ORDERS)}"])
+        raise MeshError(str(path), [f"unknown format {form!r:.40}; known: ascii, {', '.join(BYTE_ORDERS)}"])
     return form, elements
 
 

@@ -164,7 +164,7 @@ def _read(file: Path, max_points: int, up_axis: str, unit: float) -> tuple[Store
         raise MeshError(str(file), ["an elevation model is a map as it is: mbf plan and mesh_map.mesh_file read it"])
     if ending not in READERS and ending not in MESH_ENDINGS:
         known = ", ".join(sorted({*READERS, *MESH_ENDINGS}))
-        raise MeshError(str(file), [f"unknown ending '{file.suffix}', known are: {known}"])
+        raise MeshError(str(file), [f"unknown ending '{file.suffix}'; known: {known}"])
     if kind := special_file(file):
         raise MeshError(str(file), [f"expected a file, got {kind}"])
     if not file.is_file():

@@ -307,7 +307,7 @@ def test_files_far_from_each_other_are_refused_by_name(tmp_path):
         ("a.pcd", b"nothing", "is not a PCD"),
         ("a.las", b"LASF" + bytes(100), "cut off within its header: expected at least 227 bytes, found 104"),
         ("a.las", bytes(300), "is cut off, damaged or no LAS"),
-        ("a.e57", b"", "unknown ending '.e57', known are: .bt, .csv, .dae, .glb"),
+        ("a.e57", b"", "unknown ending '.e57'; known: .bt, .csv, .dae, .glb"),
     ],
 )
 def test_a_file_that_is_not_what_its_name_says_is_refused(tmp_path, name, content, text):
