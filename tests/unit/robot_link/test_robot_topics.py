@@ -164,7 +164,7 @@ def test_whatever_comes_is_an_operation_or_refused_with_a_text(frame):
 
 
 def test_a_tag_that_is_not_known_is_refused():
-    with pytest.raises(OperationError, match="no CBOR: the tag 99 of CBOR is not known"):
+    with pytest.raises(OperationError, match="expected a frame of CBOR: the tag 99 of CBOR is not known"):
         operation_of(cbor2.dumps({"op": "x", "msg": cbor2.CBORTag(99, b"")}), DECODE)
 
 
