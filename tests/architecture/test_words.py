@@ -4,6 +4,7 @@ import ast
 import io
 import re
 import tokenize
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -89,6 +90,7 @@ def prose(page):
             yield number, re.sub(r"`[^`]*`|\]\([^)]*\)", " ", line)
 
 
+@cache
 def prose_of(file):
     """Lines of docstrings, messages and comments of a module, without inline code."""
     source = file.read_text("utf-8")
