@@ -66,6 +66,8 @@ class PathTracker:
         Length along the path [m] of the point the robot has got to.
     deviation : float
         Distance [m] of the robot from that point.
+    cusp_reached : float
+        This near [m] to a cusp, at most, the robot goes on to the next section.
     """
 
     def __init__(self, path: Path, dimensions: int = 3) -> None:
@@ -75,10 +77,8 @@ class PathTracker:
         self.reverse = reverse_segments(path, self.points)
         switches = self.lengths[1:-1][self.reverse[1:] != self.reverse[:-1]]
         self.cusps: FloatArray = np.unique(np.concatenate([switches, self._turns_back(), self.lengths[-1:]]))
-        self.progress = 0.0
-        self.deviation = 0.0
-        self._joined = False
-        self._segment = 0
+        self.progress, self.deviation, self.cusp_reached = 0.0, 0.0, CUSP_REACHED
+        self._joined, self._segment = False, 0
 
     @property
     def goal(self) -> Pose:
@@ -133,10 +133,10 @@ class PathTracker:
         if not self._joined:
             self._joined, window = True, math.inf
             self._advance(self._joining_place(robot))
-        cusp = self.next_cusp
-        place = robot.tolist()
+        cusp, place = self.next_cusp, robot.tolist()
         self._advance(self._nearest_ahead(place, min(self.progress + window, cusp)))
-        if cusp < self.length and cusp - self.progress <= min(CUSP_REACHED, SHARE_OF_SECTION * (cusp - self.last_cusp)):
+        near = min(self.cusp_reached, SHARE_OF_SECTION * (cusp - self.last_cusp))
+        if cusp < self.length and cusp - self.progress <= near:
             self._advance(cusp)
         self.deviation = _norm(c - r for c, r in zip(self._point_at(self.progress), place, strict=True))
 

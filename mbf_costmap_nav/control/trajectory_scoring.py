@@ -14,6 +14,7 @@ from mbf_costmap_nav.grid.costmap import INSCRIBED, LETHAL
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.kernels.control.rollout import integrate
 
+FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 
 PATH_SPACING = 0.1
@@ -118,11 +119,23 @@ def footprint_discs(footprint: Footprint) -> Float32Array:
     return np.linspace(first, last, count).astype(np.float32)
 
 
-def is_free(cycle: ControlCycle, trajectory: Float32Array) -> bool:
-    """Whether the full footprint is free of lethal cells along a trajectory (3, steps) relative to the robot.
+def is_free(cycle: ControlCycle, velocities: Float32Array, dt: float) -> bool:
+    """Whether the full footprint is free of lethal cells while the robot drives velocities (3, steps) of ``dt`` [s].
 
-    Where it touches some already, the trajectory must lead out, see ``ControlCycle.first_collision``.
+    Along exact arcs in float64: the rollouts end up to 0.03 mm a step beside them, which is enough to touch something.
+    Where the footprint touches some already, they must lead out, see ``ControlCycle.first_collision``.
     """
-    poses = np.ascontiguousarray(trajectory.T, dtype=np.float64)
-    poses[:, :2] += (cycle.request.pose.x, cycle.request.pose.y)
-    return cycle.first_collision(poses) < 0
+    pose = cycle.request.pose
+    return cycle.first_collision(driven_poses((pose.x, pose.y, pose.yaw), velocities.T.astype(np.float64), dt)) < 0
+
+
+def driven_poses(pose: tuple[float, float, float], velocities: FloatArray, dt: float) -> FloatArray:
+    """Poses (n, 3: x, y, yaw) after each of velocities (n, 3: vx, vy, wz) kept for ``dt`` [s], from ``pose`` on."""
+    turns = velocities[:, 2] * dt
+    yaws = pose[2] + np.cumsum(turns)
+    headings = yaws - 0.5 * turns  # of the chords
+    chords = dt * np.sinc(turns / (2.0 * math.pi))  # sin(half) / half
+    c, s = np.cos(headings), np.sin(headings)
+    forward, left = velocities[:, 0], velocities[:, 1]
+    x = pose[0] + np.cumsum(chords * (forward * c - left * s))
+    return np.column_stack([x, pose[1] + np.cumsum(chords * (forward * s + left * c)), yaws])

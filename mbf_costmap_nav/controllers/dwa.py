@@ -103,7 +103,7 @@ class DWAController(SamplingFollower):
             if costs[sample] >= COLLISION:
                 break
             command = Twist.planar(*candidates[sample].tolist())
-            is_slowly = is_free(cycle, rollouts.poses[:, :checked_steps, sample])
+            is_slowly = is_free(cycle, velocities[:, :checked_steps, sample], p.sim_step)
             if is_slowly and self._held_is_free(cycle, command, checked_steps * p.sim_step):
                 return ControlResult(ExePathOutcome.SUCCESS, "", command, hindered_by)
         pose = cycle.request.pose

@@ -202,13 +202,13 @@ class MPPIController(SamplingFollower):
         touches = met.touches
         best_touches = bool(touches[int(np.argmin(costs))])
         is_spoiled = not best_touches and bool(around.meet(trajectory, p.model_dt).touches[0])
-        if not is_spoiled and is_free(cycle, trajectory[:, :checked_steps, 0]):
+        if not is_spoiled and is_free(cycle, controls[:, :checked_steps, 0], p.model_dt):
             return np.asarray(controls[:, :, 0])
         ranked = np.argsort(costs, kind="stable")[:FALLBACK_SAMPLES]
         if not best_touches:  # those that lead into somebody come last
             ranked = ranked[np.argsort(touches[ranked], kind="stable")]
         for sample in ranked.tolist():
-            if costs[sample] < COLLISION and is_free(cycle, rollouts.poses[:, :checked_steps, sample]):
+            if costs[sample] < COLLISION and is_free(cycle, velocities[:, :checked_steps, sample], p.model_dt):
                 return np.ascontiguousarray(velocities[:, :, sample])
         return None
 

@@ -26,6 +26,8 @@ from mbf_costmap_nav.kernels.map.footprint_cost import OUTSIDE
 from mbf_costmap_nav.kernels.map.penetration import penetration
 from mbf_costmap_nav.kernels.map.rasterisation import blocked_under
 
+CYCLE = 0.05
+"""Time [s] from one command to the next: the poses looked at include those where a controller is asked again."""
 ROUNDING = 0.1
 """How much [cells] deeper counts as no deeper: along a wall the depth of a round outline goes up and down so far."""
 
@@ -64,6 +66,8 @@ def obstacle_ahead(
     on_map = costmap.contains(pose.x, pose.y)
     outline_speed = command.speed + abs(command.wz) * footprint.circumscribed_radius
     step = float(np.clip(0.5 * costmap.resolution / max(outline_speed, 1e-6), duration / 100.0, duration))
+    if step < duration:
+        step = CYCLE / math.ceil(CYCLE / step)
     ahead = arc_poses((pose.x, pose.y, pose.yaw), command.vx, command.vy, command.wz, duration, step)
     for x, y, yaw in ahead.tolist():
         blocked, covered = blocked_at(x, y, yaw)

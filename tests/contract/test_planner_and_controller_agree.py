@@ -5,11 +5,13 @@ import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from mbf_abstract.geometry import Path as RobotPath
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
+from mbf_abstract.plugins import ControlRequest, PlanRequest, PlanResult, PluginKind
 
 pytestmark = pytest.mark.usefixtures("one_core")
 
@@ -39,9 +41,14 @@ STOOD = (
     ("costmap", "hybrid_astar", "dwa", 302), ("costmap", "theta_star", "dwa", 302),
     ("costmap", "hybrid_astar", "mppi", 302), ("costmap", "dijkstra", "mppi", 304), ("costmap", "astar", "dwa", 304),
     ("costmap", "hybrid_astar", "dwa", 304), ("costmap", "hybrid_astar", "rotation_shim", 304),
-    ("costmap", "dijkstra", "dwa", 308), ("mesh", "dijkstra", "mppi", 65), ("mesh", "dijkstra", "mppi", 67),
+    ("costmap", "dijkstra", "dwa", 308), ("costmap", "dijkstra", "dwa", 325), ("costmap", "hybrid_astar", "mppi", 325),
+    ("costmap", "theta_star", "rotation_shim", 325), ("mesh", "dijkstra", "mppi", 65), ("mesh", "dijkstra", "mppi", 67),
 )  # fmt: skip
 """Drives with sampled motions that stood before their goal until their time was over, crept, or touched something."""
+THROUGH_GAPS = [
+    *((name, width) for name in ("dwa", "mppi", "rotation_shim", "follow_path") for width in (0.55, 0.6)),
+    ("regulated_pure_pursuit", 0.6),
+]
 SAMPLING = (("costmap", "dwa"), ("costmap", "mppi"), ("costmap", "rotation_shim"), ("mesh", "mppi"))
 FOLLOWERS = {"regulated_pure_pursuit", "follow_path", "path_follower"}
 """Controllers that keep to their path; those that sample motions may leave it."""
@@ -94,6 +101,38 @@ def test_sampled_motions_arrive_where_room_is_narrow_and_touch_nothing(backend, 
     world = agreement.WORLDS[backend](seed)
     made = world.plugin(PluginKind.PLANNER, planner), world.plugin(PluginKind.CONTROLLER, controller)
     verdict = agreement.drive(world, *made)
+    assert verdict.ending == "arrived", verdict
+
+
+class OnePlan:
+    """A planner that knows one path, and only once."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def make_plan(self, request):
+        path, self.path = self.path, None
+        return PlanResult(ExePathOutcome.SUCCESS, "", path) if path else PlanResult(56, "a second plan is asked for")
+
+
+def bend_into_a_gap(world, x, mouth):
+    """Towards a gap at ``x`` [m], a right bend of 0.6 m that ends where the front is 4 cm before it, and through it."""
+    radius, y = 0.6, mouth + 1.15
+    before = [(x - radius - 0.05 * k, y, 0.0) for k in range(30, 0, -1)]
+    turned = np.linspace(0.0, 0.5 * np.pi, 20)
+    bend = [(x - radius + radius * np.sin(a), y - radius + radius * np.cos(a), -a) for a in turned.tolist()]
+    behind = [(x, y - radius - 0.05 * k, -0.5 * np.pi) for k in range(1, 50)]
+    return RobotPath.from_poses([world.pose_on(*map(float, pose)) for pose in before + bend + behind])
+
+
+@pytest.mark.parametrize(("controller", "width"), THROUGH_GAPS)
+def test_a_gap_hardly_wider_than_the_robot_is_driven_through_at_once(controller, width):
+    world, left, mouth = agreement.WORLDS["costmap"](0), 2.75, 4.3
+    sides = worlds.Box(0.0, left, 2.5, mouth), worlds.Box(left + width, worlds.SIDE, 2.5, mouth)
+    world.build([*worlds.WALLS, *sides])
+    path = bend_into_a_gap(world, left + 0.5 * width, mouth)
+    world.ends = path[0], path[len(path) - 1]
+    verdict = agreement.drive(world, OnePlan(path), world.plugin(PluginKind.CONTROLLER, controller))
     assert verdict.ending == "arrived", verdict
 
 

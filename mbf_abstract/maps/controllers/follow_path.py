@@ -2,7 +2,7 @@
 
 When to use: a map backend without a controller of its own. When not: to drive around obstacles (it ends with
 BLOCKED_PATH; plan again while driving), on slopes, with speed limits of layers: the controllers of the costmap and the
-mesh server do more.
+mesh server do more. Before a tight place (``tight_places``) it creeps close along the path.
 Formula: pure pursuit (Coulter 1992), the arc through a point ahead on the path.
 """
 
@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.execution.path_tracker import CUSP_REACHED, PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
@@ -27,9 +27,10 @@ from mbf_abstract.maps.controllers.room_to_turn import (
     poses_ahead,
     wider_curves,
 )
+from mbf_abstract.maps.controllers.tight_places import CLOSE_FROM, CLOSELY, TightPlaces, outline_fits
 from mbf_abstract.maps.controllers.turn_at_goal import TurnAtGoal
 from mbf_abstract.maps.map_plugin import MapPlugin
-from mbf_abstract.maps.queries import AS_CONFIGURED, CellState
+from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
@@ -75,6 +76,7 @@ class FollowPath(MapPlugin, AbstractController):
 
     _tracker: PathTracker | None = None
     _room_to_turn = RoomToTurn()
+    _tight_places = TightPlaces()
     _turn_at_goal = TurnAtGoal(AT_END)
     _dist_tolerance = 0.0
 
@@ -83,10 +85,21 @@ class FollowPath(MapPlugin, AbstractController):
         """True."""
         return True
 
+    @property
+    def remaining(self) -> float:
+        """Length [m] left along the path; inf without one."""
+        return self._tracker.remaining if self._tracker else math.inf
+
+    def to_tight_place(self, pose: Pose) -> float:
+        """Length [m] that a robot at ``pose``, in the frame of the path, has to a tight place, see ``TightPlaces``."""
+        if self._tracker is None:
+            return math.inf
+        return self._tight_places.distance(self._tracker, self.parameters.allow_reversing, outline_fits(self, pose))
+
     def set_plan(self, path: Path) -> bool:
         """Take over a path that has poses."""
-        self._tracker, self._room_to_turn = PathTracker(path, dimensions=2) if len(path) else None, RoomToTurn()
-        self._turn_at_goal = TurnAtGoal(AT_END)
+        self._tracker = PathTracker(path, dimensions=2) if len(path) else None
+        self._room_to_turn, self._tight_places, self._turn_at_goal = RoomToTurn(), TightPlaces(), TurnAtGoal(AT_END)
         return self._tracker is not None
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
@@ -148,6 +161,10 @@ class FollowPath(MapPlugin, AbstractController):
             return [self._turn(turn)]
         bearing, curvature = self._carrot(pose, tracker)
         error = off_course(bearing, backward)
+        tracker.cusp_reached = CUSP_REACHED
+        if self.to_tight_place(pose) <= CLOSE_FROM and (close := along_path(tracker, pose, backward)):
+            tracker.cusp_reached = CLOSELY
+            return [*close[::-1], *wider_curves(close[-1])[1:]]
         if abs(error) > p.rotate_to_heading_min_angle:
             return curves_ahead(self._turn(error), error, backward)
         left = max(tracker.to_cusp, gap if tracker.on_last_section else 0.0)
@@ -183,11 +200,9 @@ class FollowPath(MapPlugin, AbstractController):
         gap, turn = self._from_goal(pose, tracker)
         if gap <= self._dist_tolerance and tracker.has_arrived(self._dist_tolerance) and abs(turn) > SMALL_TURN:
             return [self._turn(turn)]
-        backward, check = self._backward(tracker), self.navigation_map.pose_check(AS_CONFIGURED)
-        for x, y, yaw in poses_ahead(tracker, reach, backward).tolist():
-            place = Pose.planar(x, y, yaw, pose.z, pose.frame_id, pose.stamp)
-            if check(self.on_map(place)).state is CellState.LETHAL:
-                return []
+        backward, fits = self._backward(tracker), outline_fits(self, pose)
+        if not all(fits(*one) for one in poses_ahead(tracker, reach, backward).tolist()):
+            return []
         error = self._angle_left(pose, tracker)
         return [*along_path(tracker, pose, backward), *([self._turn(error)] if abs(error) > SMALL_TURN else [])]
 
@@ -214,12 +229,8 @@ class FollowPath(MapPlugin, AbstractController):
 
     def _carrot(self, pose: Pose, tracker: PathTracker) -> tuple[float, float]:
         """Bearing [rad] of the point ahead on the path, and curvature [1/m] of the arc to it."""
-        p = self.parameters
-        if tracker.on_last_section:
-            point = tracker.point_at(tracker.progress + p.look_ahead_dist)
-        else:
-            point = tracker.straight_on(p.look_ahead_dist)
-        x, y = point.tolist()
+        last, ahead = tracker.on_last_section, self.parameters.look_ahead_dist
+        x, y = (tracker.point_at(tracker.progress + ahead) if last else tracker.straight_on(ahead)).tolist()
         return arc_to(pose, np.array([x, y, pose.z]))
 
     def _backward(self, tracker: PathTracker) -> bool:

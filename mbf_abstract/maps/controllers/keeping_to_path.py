@@ -5,9 +5,10 @@ is often to stand: the price of the costs there outweighs what is left of the pa
 manoeuvre, which fits only as it was planned. When not: cars, which ``follow_path`` cannot drive; they only give up.
 
 Rule: a path is driven as ``follow_path`` drives it, with the limits of the controller, before a place where the robot
-has to stop or reverse but cannot turn; and where the samples have stood for a while, or failed, until the robot is
-``AWAY`` from there. Where that is blocked or would meet somebody who moves, the samples decide. A robot that still
-stands after longer gets no command any more, but the failure NO_VALID_CMD with its place.
+has to stop or reverse but cannot turn, or has hardly any room to either side (``tight_places``); and where the samples
+have stood for a while, or failed, until the robot is ``AWAY`` from there. Where that is blocked or would meet somebody
+who moves, the samples decide. A robot that still stands after longer gets no command any more, but the failure
+NO_VALID_CMD with its place.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.tracking.avoidance import MovingAround
 from mbf_abstract.plugins import ControlRequest, ControlResult
 
-AWAY = 0.5
-"""So far [m] from where it stood the robot samples again."""
+AWAY, AHEAD, FAR = 0.5, 0.25, 2.0
+"""The robot samples again ``AWAY`` [m] from where it stood if it has come ``AHEAD`` on its path, else ``FAR``."""
 FARTHEST = 100.0
 """However far [m] from its path the robot is, that is for the controller to judge."""
 LOOK, LOOK_STEP = 1.5, 0.1
@@ -84,6 +85,7 @@ class KeepingToPath:
         self._follower = FollowPath(replace(context, name=f"{context.name}.path", parameters=FollowPathParameters()))
         self._standing = Standing()
         self._stood_at: Pose | None = None
+        self._remained = math.inf
         self.is_keeping = False
         """Whether the last command was one along the path."""
 
@@ -132,14 +134,19 @@ class KeepingToPath:
         now = self._follower.clock.now()
         stood = self._standing.time(now, limits.fastest, limits.turning)
         along, reason = None, ""
-        keeps = not limits.is_car and (self._has_stood(request.pose, stood >= p.keep_to_path_after) or is_narrow())
+        keeps = not limits.is_car and (
+            self._has_stood(request.pose, stood >= p.keep_to_path_after)
+            or is_narrow()
+            or self._follower.to_tight_place(request.pose) < math.inf
+        )
         if keeps:
             along, reason = self._along_path(request, limits, around, accepts)
         result = along or sampled()
         if not (result.success or keeps or limits.is_car):
             along, _ = self._along_path(request, limits, around, accepts)
-            self._stood_at = request.pose if along else self._stood_at
-            result = along or result
+            if along:
+                self._stands_at(request.pose)
+                result = along
         self.is_keeping = along is not None
         if stood >= p.give_up_after and result.success and not result.hindered_by:
             result = stands(request.pose, stood, reason)
@@ -149,12 +156,20 @@ class KeepingToPath:
         return result
 
     def _has_stood(self, pose: Pose, stands_now: bool) -> bool:
-        """Whether the robot stands, or has not come away yet from where it did."""
+        """Whether the robot stands, or has not come away yet from where it did.
+
+        One that has backed out, and then sampled, would stand at the same place again.
+        """
         if stands_now:
-            self._stood_at = pose
-        elif self._stood_at is not None and pose.distance_to(self._stood_at) > AWAY:
-            self._stood_at = None
+            self._stands_at(pose)
+        elif self._stood_at is not None:
+            is_ahead = self._follower.remaining <= self._remained - AHEAD
+            if pose.distance_to(self._stood_at) > (AWAY if is_ahead else FAR):
+                self._stood_at = None
         return self._stood_at is not None
+
+    def _stands_at(self, pose: Pose) -> None:
+        self._stood_at, self._remained = pose, self._follower.remaining
 
     def _along_path(
         self, request: ControlRequest, limits: MotionLimits, around: MovingAround, accepts: Callable[[Twist], bool]

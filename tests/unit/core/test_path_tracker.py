@@ -129,6 +129,15 @@ def test_short_strokes_of_a_manoeuvre_are_not_skipped_while_the_robot_stands():
     assert not tracker.driving_backward
 
 
+def test_a_robot_that_is_driven_closely_comes_closer_to_a_cusp_before_it_goes_on():
+    poses = [Pose.planar(x, 0.0, 0.0) for x in (0.0, 1.0, 2.0, 1.0)]
+    tracker = PathTracker(Path.from_poses(poses), dimensions=2)
+    tracker.cusp_reached = 0.02
+    for x, is_there in ((1.5, False), (1.95, False), (1.985, True)):
+        tracker.update((x, 0.0))
+        assert tracker.driving_backward is is_there
+
+
 def test_past_a_cusp_and_past_the_end_a_path_is_taken_to_lead_straight_on():
     tracker = PathTracker(path_through((0, 0), (2, 0), (0, 0.02), spacing=0.05))
     tracker.update((1.7, 0.0, 0.0))

@@ -91,6 +91,22 @@ def test_where_planners_and_controllers_see_no_collision_a_motion_is_free():
     assert refused > 0 and clipped > 0  # by less than a quarter of a cell, which counts for none of them
 
 
+def test_a_motion_that_is_free_touches_nothing_where_the_next_commands_are_asked_for():
+    rng, free, long = np.random.default_rng(0), 0, Footprint([[0.5, 0.25], [-0.5, 0.25], [-0.5, -0.25], [0.5, -0.25]])
+    check = FootprintCheck(long, 0.05)
+    for _ in range(1000):
+        cells = np.where(rng.random((80, 80)) < 0.003, 254, 0).astype(np.uint8)
+        costmap, yaw = Costmap(cells, 0.05, -2.0, -2.0), rng.uniform(-math.pi, math.pi)
+        vx, wz = rng.uniform(-0.1, 0.1), rng.uniform(-0.3, 0.3)
+        if blocked_cells(costmap, long, 0.0, 0.0, yaw)[0]:
+            continue
+        if not obstacle_ahead(costmap, long, Pose.planar(0.0, 0.0, yaw), Twist.planar(vx, 0.0, wz), 1.0):
+            free += 1
+            poses = arc_poses((0.0, 0.0, yaw), vx, 0.0, wz, 1.0, 0.05)
+            assert check.first_collision(costmap, poses) < 0
+    assert free > 300
+
+
 def test_on_a_path_the_footprint_may_reach_over_the_border_and_the_base_may_not():
     costmap, wall = points_at(), points_at((1.95, 0.0))
     there, forward = Pose.planar(1.3, 0.0), Twist.planar(0.5)

@@ -12,7 +12,7 @@ from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
-from mbf_costmap_nav.control.trajectory_scoring import footprint_discs
+from mbf_costmap_nav.control.trajectory_scoring import driven_poses, footprint_discs
 from mbf_costmap_nav.controllers.dwa import DWAController, sample_velocities, sample_window, slowed_down
 from mbf_costmap_nav.controllers.mppi import IDLE_CYCLES, MPPIController
 from mbf_costmap_nav.critics.obstacle_critic import VALUE_OF_COST
@@ -46,6 +46,18 @@ def test_integrated_poses_equal_step_by_step_rotation(seed, yaw):
         x += (vx * c - vy * s) * 0.05
         y += (vx * s + vy * c) * 0.05
     np.testing.assert_allclose(poses[:, -1], [x, y, heading], atol=1e-5)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds, yaw=st.floats(-3, 3))
+def test_what_the_footprint_is_checked_along_are_the_arcs_a_robot_drives_one_after_the_other(seed, yaw):
+    velocities = random_velocities(seed)[:, :, 0].T.astype(np.float64)
+    velocities[3:5, 2] = 0.0
+    pose, along = (1.0, -2.0, yaw), []
+    for vx, vy, wz in velocities.tolist():
+        along.append(arc_poses(pose, vx, vy, wz, 0.05, 0.05)[-1])
+        pose = tuple(along[-1].tolist())
+    np.testing.assert_allclose(driven_poses((1.0, -2.0, yaw), velocities, 0.05), along, atol=1e-12)
 
 
 @pytest.mark.parametrize("turn", [-2.0, 0.5, 2.0])

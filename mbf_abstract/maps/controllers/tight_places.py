@@ -1,0 +1,99 @@
+"""Where on its path a robot has hardly any room to either side: there it must be driven closely along the path.
+
+When to use: in controllers that steer to a point ahead, or sample motions. Both cut the curve before a gap, and a robot
+that stands in the mouth of a gap beside its path can neither turn nor go on. When not: along one wall; a robot has room
+to the other side there. Nor where something stands on the path; samples lead around it.
+
+Rule: a place is tight where the outline fits on the path, but would touch something ``ROOM`` farther to the left, and
+``ROOM`` farther to the right. Controllers keep to the path from ``REACH`` before such a place on, and closely from
+``CLOSE_FROM`` on, so that the robot has come onto its path where the gap begins.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import FloatArray, Pose
+from mbf_abstract.geometry.arithmetic import arctan2
+from mbf_abstract.maps.map_plugin import MapPlugin
+from mbf_abstract.maps.queries import PADDED, CellState
+
+ROOM = 0.05
+"""Room [m] to a side that a controller needs which does not drive closely."""
+REACH = 1.5
+"""So far [m] ahead on the path it is looked at."""
+CLOSE_FROM = 1.0
+"""So far [m] before a tight place the robot is driven closely."""
+SPACING, ARM = 0.1, 0.2
+"""Distance [m] of the poses looked at; each looks along the line between the points ``ARM`` before and behind it."""
+CLOSELY = 0.02
+"""So near [m] a robot that is driven closely comes to a cusp."""
+KEPT = 0.05
+"""An answer holds until the robot has come so far [m] on its path."""
+
+Fits = Callable[[float, float, float], bool]
+"""Whether the outline touches nothing at a pose (x, y [m], yaw [rad])."""
+
+
+class TightPlaces:
+    """What lies ahead on one path."""
+
+    def __init__(self) -> None:
+        self._asked_at = -math.inf
+        self._next = math.inf
+
+    def distance(self, tracker: PathTracker, reverses: bool, fits: Fits) -> float:
+        """Length [m] along the path to the next tight place, whatever cusps lie between; inf = none within ``REACH``.
+
+        Parameters
+        ----------
+        reverses : bool
+            Whether the robot drives backward where the poses of the path look against its direction.
+        """
+        if tracker.progress - self._asked_at >= KEPT:
+            self._asked_at = tracker.progress
+            lengths = np.arange(tracker.progress, min(tracker.progress + REACH, tracker.length), SPACING)
+            poses = _poses_at(tracker, lengths, reverses).tolist()
+            first = next((k for k, (x, y, yaw) in enumerate(poses) if not has_room(x, y, yaw, fits)), None)
+            is_tight = first is not None and (fits(*poses[first]) or _fits_as_planned(tracker, lengths[first], fits))
+            self._next = float(lengths[first]) if is_tight else math.inf
+        return max(self._next - tracker.progress, 0.0)
+
+
+def _poses_at(tracker: PathTracker, lengths: FloatArray, reverses: bool) -> FloatArray:
+    """Poses (n, 3: x, y [m], yaw [rad]) at lengths (n,) [m] along a path, each with the heading of its stroke."""
+    strokes = np.searchsorted(tracker.cusps, lengths, side="right")
+    begins, ends = np.append(0.0, tracker.cusps)[strokes], np.append(tracker.cusps, tracker.length)[strokes]
+    steps = tracker.points_at(np.minimum(lengths + ARM, ends)) - tracker.points_at(np.maximum(lengths - ARM, begins))
+    yaws = arctan2(steps[:, 1], steps[:, 0])
+    if reverses and len(tracker.reverse):
+        segments = np.searchsorted(tracker.lengths, lengths, side="right") - 1
+        yaws += np.where(tracker.reverse[np.minimum(segments, len(tracker.reverse) - 1)], math.pi, 0.0)
+    return np.column_stack([tracker.points_at(lengths)[:, :2], yaws])
+
+
+def _fits_as_planned(tracker: PathTracker, length: float, fits: Fits) -> bool:
+    """Whether the outline fits with the heading of the pose at ``length`` [m]; near a bend the chord has another."""
+    pose = tracker.path[int(np.argmin(np.abs(tracker.lengths - length)))]
+    return fits(pose.x, pose.y, pose.yaw)
+
+
+def has_room(x: float, y: float, yaw: float, fits: Fits) -> bool:
+    """Whether a robot at a pose (x, y [m], yaw [rad]) could as well stand ``ROOM`` farther to one side."""
+    left_x, left_y = -ROOM * math.sin(yaw), ROOM * math.cos(yaw)
+    return fits(x + left_x, y + left_y, yaw) or fits(x - left_x, y - left_y, yaw)
+
+
+def outline_fits(plugin: MapPlugin, near: Pose) -> Fits:
+    """The question to a plugin's map, for poses at the height and in the frame of the pose ``near``."""
+    check = plugin.navigation_map.pose_check(PADDED)
+
+    def fits(x: float, y: float, yaw: float) -> bool:
+        place = Pose.planar(x, y, yaw, near.z, near.frame_id, near.stamp)
+        return check(plugin.on_map(place)).state is not CellState.LETHAL
+
+    return fits

@@ -1,0 +1,85 @@
+"""Where a path leads through a gap that is hardly wider than the robot, controllers know it in time."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.maps.controllers.tight_places import KEPT, REACH, ROOM, TightPlaces
+
+LINE = [(0.1 * k, 0.0, 0.0) for k in range(41)]
+
+
+def tracker_at(x, points=LINE):
+    tracker = PathTracker(Path.from_points(points), dimensions=2)
+    tracker.update((x, 0.0))
+    return tracker
+
+
+def gap(begin, end, left, right):
+    """A robot fits between ``begin`` and ``end`` [m] along x if it is at most ``left`` and ``right`` [m] off y = 0."""
+    return lambda x, y, yaw: not begin <= x <= end or -right <= y <= left
+
+
+@pytest.mark.parametrize("x", [0.0, 0.45, 1.0])
+def test_the_length_to_a_gap_without_room_to_either_side_is_known(x):
+    assert TightPlaces().distance(tracker_at(x), True, gap(1.2, 2.0, 0.02, 0.03)) == pytest.approx(1.2 - x, abs=0.1)
+
+
+def test_in_the_gap_it_is_zero_and_a_gap_beyond_the_reach_does_not_count():
+    assert TightPlaces().distance(tracker_at(1.5), True, gap(1.2, 2.0, 0.02, 0.02)) == 0.0
+    assert TightPlaces().distance(tracker_at(0.0), True, gap(REACH + 0.1, 2.0, 0.02, 0.02)) == math.inf
+
+
+@pytest.mark.parametrize(("left", "right"), [(0.0, 2 * ROOM), (2 * ROOM, 0.0), (2 * ROOM, 2 * ROOM)])
+def test_room_to_one_side_is_room_as_along_a_wall(left, right):
+    assert TightPlaces().distance(tracker_at(0.5), True, gap(1.0, 2.0, left, right)) == math.inf
+
+
+def test_what_stands_on_the_path_is_no_gap():
+    assert TightPlaces().distance(tracker_at(0.5), True, lambda x, y, yaw: x < 1.0) == math.inf
+
+
+def test_a_gap_behind_a_cusp_counts_and_each_stroke_is_looked_at_as_it_is_driven():
+    yaws = []
+    there, back = [(0.1 * k, 0.0) for k in range(11)], [(0.1 * k, 0.0) for k in range(9, -11, -1)]
+    poses = [Pose.planar(x, y, 0.0) for x, y in there + back]
+    tracker = PathTracker(Path.from_poses(poses), dimensions=2)
+    tracker.update((0.7, 0.0))
+
+    def fits(x, y, yaw):
+        yaws.append(yaw)
+        return gap(0.0, 0.5, 0.02, 0.02)(x, y, yaw)
+
+    assert TightPlaces().distance(tracker, True, fits) == pytest.approx(0.3 + 0.5, abs=0.11)
+    assert np.allclose(np.cos(yaws), 1.0), "forward and backward, with the same heading"
+
+
+def test_a_place_that_only_the_heading_of_the_plan_fits_is_no_obstacle():
+    poses = [Pose.planar(x, y, 0.3 if x >= 1.0 else 0.0) for x, y, _ in LINE]
+    tracker = PathTracker(Path.from_poses(poses), dimensions=2)
+    tracker.update((0.0, 0.0))
+
+    def slanted(x, y, yaw):
+        return x < 1.0 or (abs(y) < 0.01 and yaw == pytest.approx(0.3))
+
+    assert TightPlaces().distance(tracker, True, slanted) == pytest.approx(1.0, abs=0.1)
+
+
+def test_an_answer_holds_until_the_robot_has_come_on():
+    asked = []
+
+    def fits(x, y, yaw):
+        asked.append(x)
+        return gap(1.2, 2.0, 0.0, 0.0)(x, y, yaw)
+
+    places, tracker = TightPlaces(), tracker_at(0.5)
+    assert places.distance(tracker, True, fits) == pytest.approx(0.7, abs=0.1)
+    before = len(asked)
+    tracker.update((0.5 + 0.6 * KEPT, 0.0))
+    assert places.distance(tracker, True, fits) == pytest.approx(0.7 - 0.6 * KEPT, abs=0.1) and len(asked) == before
+    tracker.update((0.5 + 1.1 * KEPT, 0.0))
+    places.distance(tracker, True, fits)
+    assert len(asked) > before
