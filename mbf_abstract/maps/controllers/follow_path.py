@@ -30,7 +30,7 @@ from mbf_abstract.maps.controllers.room_to_turn import (
 from mbf_abstract.maps.controllers.tight_places import CLOSE_FROM, CLOSELY, TightPlaces, outline_fits
 from mbf_abstract.maps.controllers.turn_at_goal import TurnAtGoal
 from mbf_abstract.maps.map_plugin import MapPlugin
-from mbf_abstract.maps.queries import CellState
+from mbf_abstract.maps.queries import AS_CONFIGURED, PADDED, CellState
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
@@ -94,7 +94,8 @@ class FollowPath(MapPlugin, AbstractController):
         """Length [m] that a robot at ``pose``, in the frame of the path, has to a tight place, see ``TightPlaces``."""
         if self._tracker is None:
             return math.inf
-        return self._tight_places.distance(self._tracker, self.parameters.allow_reversing, outline_fits(self, pose))
+        fits = outline_fits(self, pose, PADDED)
+        return self._tight_places.distance(self._tracker, self.parameters.allow_reversing, fits)
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path that has poses."""
@@ -200,7 +201,7 @@ class FollowPath(MapPlugin, AbstractController):
         gap, turn = self._from_goal(pose, tracker)
         if gap <= self._dist_tolerance and tracker.has_arrived(self._dist_tolerance) and abs(turn) > SMALL_TURN:
             return [self._turn(turn)]
-        backward, fits = self._backward(tracker), outline_fits(self, pose)
+        backward, fits = self._backward(tracker), outline_fits(self, pose, AS_CONFIGURED)
         if not all(fits(*one) for one in poses_ahead(tracker, reach, backward).tolist()):
             return []
         error = self._angle_left(pose, tracker)

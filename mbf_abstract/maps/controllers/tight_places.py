@@ -20,7 +20,7 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import arctan2
 from mbf_abstract.maps.map_plugin import MapPlugin
-from mbf_abstract.maps.queries import PADDED, CellState
+from mbf_abstract.maps.queries import CellState, PlaceQuery
 
 ROOM = 0.05
 """Room [m] to a side that a controller needs which does not drive closely."""
@@ -88,9 +88,9 @@ def has_room(x: float, y: float, yaw: float, fits: Fits) -> bool:
     return fits(x + left_x, y + left_y, yaw) or fits(x - left_x, y - left_y, yaw)
 
 
-def outline_fits(plugin: MapPlugin, near: Pose) -> Fits:
+def outline_fits(plugin: MapPlugin, near: Pose, query: PlaceQuery) -> Fits:
     """The question to a plugin's map, for poses at the height and in the frame of the pose ``near``."""
-    check = plugin.navigation_map.pose_check(PADDED)
+    check = plugin.navigation_map.pose_check(query)
 
     def fits(x: float, y: float, yaw: float) -> bool:
         place = Pose.planar(x, y, yaw, near.z, near.frame_id, near.stamp)
