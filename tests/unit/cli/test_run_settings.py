@@ -65,7 +65,7 @@ def test_a_copy_overwrites_nothing(tmp_path):
     mine = tmp_path / copy_scenario("indoor", tmp_path / "other")[1].relative_to(tmp_path / "other")
     mine.write_text("mine")
 
-    with pytest.raises(ConfigError, match="no file"):
+    with pytest.raises(ConfigError, match="a file that does not exist yet"):
         copy_scenario("indoor", tmp_path)
 
     assert mine.read_text() == "mine" and not (tmp_path / "indoor.yaml").exists()
