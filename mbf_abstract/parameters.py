@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from mbf_abstract.config.known_keys import key_hint
+
 
 class ParameterModel(BaseModel):
     """Base of every parameter block: unknown keys and non-finite numbers are refused, values are frozen."""
@@ -40,9 +42,14 @@ def with_changes(
     Raises
     ------
     ValueError
-        A value is not legal (pydantic's ValidationError is one), or a parameter is read only once, at the start.
+        There is no such parameter, a value is not legal (pydantic's ValidationError is one), or a parameter is read
+        only once, at the start.
     """
     model = type(parameters)
+    unknown = [key for key in changes if key not in model.model_fields]
+    if unknown:
+        hints = [(key, key_hint(key, model.model_fields)) for key in unknown]
+        raise ValueError("; ".join(f"{key}: expected a known parameter{hint and ', ' + hint}" for key, hint in hints))
     new = model.model_validate({**parameters.model_dump(), **changes})
     if read_once is None:
         fields = model.model_fields.items()

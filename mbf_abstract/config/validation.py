@@ -16,13 +16,13 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from mbf_abstract.config.bounded_files import configured_file
-from mbf_abstract.config.findings import Finding, KeyPath, describe_value, suggest
+from mbf_abstract.config.findings import Finding, KeyPath, describe_value
+from mbf_abstract.config.known_keys import key_hint
 from mbf_abstract.config.yaml_source import YamlDocument
 from mbf_abstract.parameters import ParameterModel
 
 Model = TypeVar("Model", bound=ParameterModel)
 
-_MAX_LISTED_KEYS = 15
 _EXPECTED = {
     "bool_type": "true or false",
     "string_type": "a text",
@@ -121,7 +121,7 @@ def _finding_of(
 ) -> Finding:
     path = (*key_path, *loc)
     if error["type"] == "extra_forbidden":
-        hint = _key_hint(str(loc[-1]), _fields_at(model, loc[:-1]))
+        hint = key_hint(str(loc[-1]), _fields_at(model, loc[:-1]))
         return document.finding(path, "a known key", repr(loc[-1]), hint)
     if error["type"].startswith("union_tag"):
         return _finding_of_tag(error, document, path)
@@ -148,22 +148,6 @@ def _expected(model: type[BaseModel], error: ErrorDetails, loc: KeyPath) -> str:
         return f"a value {limits}".strip()
     text = _EXPECTED.get(error["type"]) or error["msg"].removeprefix("Value error, ")
     return text.removeprefix("Input should be ")
-
-
-def _key_hint(key: str, fields: Mapping[str, FieldInfo]) -> str:
-    renamed = [name for name, field in fields.items() if _extra(field).get("was") == key]
-    if renamed:
-        return f"it is called {renamed[0]!r} now"
-    closest, known = suggest(key, fields), list(fields)
-    if closest or not known:
-        return closest
-    more = ", ..." if len(known) > _MAX_LISTED_KEYS else ""
-    return "known keys: " + ", ".join(known[:_MAX_LISTED_KEYS]) + more
-
-
-def _extra(field: FieldInfo) -> Mapping[str, Any]:
-    """What ``parameter`` has declared beside the range."""
-    return field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
 
 
 def _location_in_data(block: object, error: ErrorDetails) -> KeyPath:

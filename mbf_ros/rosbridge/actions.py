@@ -21,7 +21,7 @@ from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message, MessageError
 from mbf_ros.rosbridge.client import Client
-from mbf_ros.rosbridge.protocol import OperationError, frame
+from mbf_ros.rosbridge.protocol import OperationError, frame, no_such
 
 MAX_GOALS = 20
 """How many goals of one client may be unfinished at a time."""
@@ -101,7 +101,7 @@ class ActionTable:
     ) -> tuple[ServedAction, Any]:
         action = self.actions.get(name)
         if action is None:
-            raise OperationError(f"there is no action {name!r}")
+            raise OperationError(no_such("action", name, self.actions))
         package, _, short = action.mapping.type.partition("/action/")
         if type_name not in ("", action.mapping.type, f"{package}/{short}"):
             raise OperationError(f"the action {name!r}: expected the type {action.mapping.type}, got {type_name}")

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
+from mbf_abstract.config.known_keys import key_hint
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.navigator import Navigator
 from mbf_ros.map_messages import Output
@@ -85,7 +86,7 @@ class ServerParameters:
         """Change a parameter; raises ValueError where it is not known, not legal or read only at the start."""
         key = _key(name)
         if key not in NavigationParameters.model_fields:
-            raise ValueError(f"there is no parameter {name!r}")
+            raise ValueError(f"there is no parameter {name!r}; {key_hint(key, NavigationParameters.model_fields)}")
         self._server.set_parameters(**{key: json.loads(value)})
 
 

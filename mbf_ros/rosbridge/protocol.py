@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from mbf_abstract.config.findings import describe_value
@@ -39,6 +39,11 @@ def text_in(operation: Operation, name: str, default: str | None = None) -> str:
         expected = f"expected a text of at most {MAX_NAME} characters, got {describe_value(value)}"
         raise OperationError(f"{operation['op']}: {name}: {expected}")
     return value
+
+
+def no_such(kind: str, name: str, known: Iterable[str]) -> str:
+    """Return that there is no service or action of a name, and which there are."""
+    return f"there is no {kind} {name!r}; known: {', '.join(sorted(known)) or 'none'}"
 
 
 def absolute(name: str) -> str:

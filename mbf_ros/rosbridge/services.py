@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from mbf_abstract.time.clock import Clock
 from mbf_ros.messages.interfaces import Message, MessageError, completed, known_types
 from mbf_ros.rosbridge.client import Client
-from mbf_ros.rosbridge.protocol import OperationError, frame
+from mbf_ros.rosbridge.protocol import OperationError, frame, no_such
 
 MAX_CALLS = 20
 """How many calls of one client may be worked on at a time."""
@@ -59,7 +59,7 @@ class ServiceTable:
         service = self.services.get(name)
         try:
             if service is None:
-                raise OperationError(f"there is no service {name!r}")
+                raise OperationError(no_such("service", name, self.services))
             if client.calls >= MAX_CALLS:
                 raise OperationError(f"{MAX_CALLS} services of this client are being worked on already")
             request = service.request(values)

@@ -3,7 +3,9 @@
 import pytest
 
 from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.factory import read_config
+from mbf_abstract.testing.conformance.site import site
 
 MESH = """\
 backend: mesh
@@ -49,6 +51,25 @@ def test_how_far_points_count_has_one_name(tmp_path, layer, old, new):
     assert f"mesh_map.seen.{old}: expected a known key, got '{old}'" in findings
     assert f"it is called '{new}' now" in findings
     assert "seen" not in _findings(tmp_path, text.replace("]}", f"], seen: {{sources: [lidar], {new}: 1.0}}}}"))
+
+
+@pytest.mark.parametrize(
+    ("backend", "controller", "old", "new"),
+    [
+        ("costmap", "regulated_pure_pursuit", "collision_check_time", "check_ahead_time"),
+        ("mesh", "path_follower", "obstacle_distance", "check_ahead_dist"),
+    ],
+)
+def test_an_earlier_key_is_refused_with_its_new_name_at_run_time_too(backends, backend, controller, old, new):
+    with site(backends[backend]) as made:
+        change, name = made.server.set_plugin_parameters, made.server.plugins.names(PluginKind.CONTROLLER)[0]
+        with pytest.raises(ValueError, match=f"{old}: expected a known parameter, it is called '{new}' now"):
+            change(PluginKind.CONTROLLER, name, **{old: 1.0})
+        with pytest.raises(ValueError, match="did you mean 'max_vel_x'"):
+            change(PluginKind.CONTROLLER, name, max_vel=1.0)
+        with pytest.raises(ValueError, match="did you mean 'controller_frequency'"):
+            made.server.set_parameters(controller_freq=1.0)
+        change(PluginKind.CONTROLLER, name, **{new: 1.0})
 
 
 def _findings(folder, text):

@@ -16,6 +16,7 @@ from typing import Any
 import yaml
 
 from mbf_abstract.config.findings import ConfigError, Finding
+from terrain.provenance.frozen_keys import under_frozen_keys
 from terrain.provenance.named_files import hash_with_named_files
 from terrain.scenarios.scenario import Scenario
 
@@ -23,6 +24,8 @@ Judge = Callable[[Scenario, int], bool]
 """Whether a robot can get to the goal of a scenario with this seed at all."""
 
 LENGTH = 12  # characters of a hash
+FROZEN_KEYS = {"mesh": {"obstacle_max_range": "max_obstacle_dist"}}
+"""Parameters that have another name now, by the backend of their configuration: the hash keeps the earlier one."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +111,10 @@ class Protocol:
         first = self.trials[0].scenario
         common = {
             "protocol": [self.name, self.version, dict(self.rules)],
-            "navigation": {backend: _content(file) for backend, file in sorted(first.navigation.items())},
+            "navigation": {
+                backend: under_frozen_keys(_content(file), FROZEN_KEYS.get(backend, {}))
+                for backend, file in sorted(first.navigation.items())
+            },
         }
         files = {file for trial in self.trials if (file := _file(trial)) is not None}
         contents = {file: hash_with_named_files(file).hex() for file in files}

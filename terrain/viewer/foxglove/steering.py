@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
+from mbf_abstract.config.known_keys import key_hint
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.geometry import Pose
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
@@ -108,7 +109,8 @@ class Steering:
         """Change parameters; raises ValueError where one is not known, not legal or read only at the start."""
         unknown = next((name for name in changes if name not in NavigationParameters.model_fields), None)
         if unknown is not None:
-            raise ValueError(f"there is no parameter {unknown!r}")
+            hint = key_hint(unknown, NavigationParameters.model_fields)
+            raise ValueError(f"there is no parameter {unknown!r}; {hint}")
         self._server.set_parameters(**changes)
 
     def _goal(self, message: Any) -> Callable[[], Pose]:

@@ -185,7 +185,7 @@ def test_a_path_that_means_nothing_is_an_invalid_path(serving, connect, send):
 @pytest.mark.parametrize(
     ("name", "kind", "goal", "text"),
     [
-        ("/dance", "dances/action/Waltz", {}, "there is no action '/dance'"),
+        ("/dance", "dances/action/Waltz", {}, "there is no action '/dance'; known: /compute_path_through_poses, /"),
         (
             "/navigate_to_pose",
             "mbf_msgs/action/MoveBase",

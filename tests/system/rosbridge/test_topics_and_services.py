@@ -177,7 +177,7 @@ def test_pause_resume_and_cancel_all_are_services(serving, connect):
 @pytest.mark.parametrize(
     ("name", "request_", "text"),
     [
-        ("/dance", {}, "there is no service '/dance'"),
+        ("/dance", {}, "there is no service '/dance'; known: .*/move_base_flex/pause, "),
         ("/move_base_flex/check_pose_cost", {"current_pose": True}, "the field 'costmap'"),
         ("/move_base_flex/check_pose_cost", {"costmap": 1, "pose": 3}, "pose: expected an object"),
     ],

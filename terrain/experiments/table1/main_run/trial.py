@@ -16,6 +16,7 @@ from terrain.experiments.table1.counting import Leg, Tally
 from terrain.experiments.table1.environments import warehouse_environment as warehouse
 from terrain.experiments.table1.main_run.buildings import buildings, head_start
 from terrain.experiments.table1.main_run.conditions import CONDITIONS
+from terrain.provenance.frozen_keys import under_frozen_keys
 
 NAVIGATION = Path(__file__).with_name("navigation.yaml")
 FROZEN_KEYS = {"check_ahead_time": "collision_check_time"}  # of parameters that have another name now
@@ -53,15 +54,8 @@ def parameters_of(building: str, depot: Path | None) -> dict[str, Any]:
 
 def hash_of_parameters(building: str, depot: Path | None) -> str:
     """Return a short hash of ``parameters_of``: a new name of a key is no new parameter."""
-    text = json.dumps(_under_frozen_keys(parameters_of(building, depot)), sort_keys=True, default=str)
+    text = json.dumps(under_frozen_keys(parameters_of(building, depot), FROZEN_KEYS), sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:12]
-
-
-def _under_frozen_keys(value: Any) -> Any:
-    """The same parameters under the keys that they were frozen with."""
-    if isinstance(value, Mapping):
-        return {FROZEN_KEYS.get(key, key): _under_frozen_keys(inner) for key, inner in value.items()}
-    return [_under_frozen_keys(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def run_trial(trial: Trial) -> dict[str, Any]:

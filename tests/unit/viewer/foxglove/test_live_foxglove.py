@@ -111,7 +111,7 @@ def test_parameters_are_read_and_those_that_may_change_while_it_runs_are_changed
     assert refused["parameters"] == changed["parameters"]
     assert "planner_patience" in app.operation("status")["message"]
     app.send({"op": "setParameters", "parameters": [{"name": "dance", "value": 1}]})
-    assert "there is no parameter 'dance'" in app.operation("status")["message"]
+    assert "there is no parameter 'dance'; known keys: planner_frequency, " in app.operation("status")["message"]
 
 
 def test_a_page_of_another_site_and_one_who_does_not_know_the_token_are_refused(served, client):
