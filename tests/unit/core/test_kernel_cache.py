@@ -22,6 +22,15 @@ from kernels.search import search
 value = search(1)
 print(value, sum(search.stats.cache_hits.values()))
 """
+HASHES = DECORATOR + "import numpy as np\n@kernel\ndef hashed(text, x):\n    return hash(text), np.cumsum(x)\n"
+CALL_HASHES = """
+import sys
+import numpy as np
+from kernels.hashes import hashed
+for numbers in (np.ones(3), np.ones(2, int))[: int(sys.argv[1])]:
+    value, sums = hashed("text", numbers)
+    print(value == hash("text"), *sums, "numba.np.polynomial.polynomial_core" in sys.modules)
+"""
 
 
 def call_in_a_process_of_its_own(folder: Path) -> tuple[int, int]:
@@ -43,6 +52,20 @@ def test_a_kernel_is_compiled_anew_only_when_a_kernel_it_calls_from_another_file
     assert call_in_a_process_of_its_own(tmp_path) == (20, 1)
     (kernels / "step.py").write_text(STEP.format(2))
     assert call_in_a_process_of_its_own(tmp_path) == (30, 0)
+
+
+def test_code_on_disk_is_loaded_without_what_numba_needs_to_compile_which_it_can_still_do(tmp_path):
+    (tmp_path / "kernels").mkdir()
+    (tmp_path / "kernels" / "hashes.py").write_text(HASHES)
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+
+    def call(times):
+        command = [sys.executable, "-c", CALL_HASHES, str(times)]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, check=True, capture_output=True, text=True)
+        return done.stdout.splitlines()
+
+    assert call(1) == ["True 1.0 2.0 3.0 True"]
+    assert call(2) == ["True 1.0 2.0 3.0 False", "True 1 2 True"]
 
 
 def test_two_first_runs_at_once_both_come_out_right_and_leave_a_cache_that_is_used(tmp_path):
