@@ -6,6 +6,8 @@ between, so both agree where a path follows an edge.
 
 from __future__ import annotations
 
+import numpy as np
+
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.motion.path_costs import way_cost
 from mbf_mesh_nav.map.mesh_map import MeshMap
@@ -24,5 +26,10 @@ def cost_along(mesh_map: MeshMap, snapshot: MeshSnapshot, positions: FloatArray,
         goal have, do not count.
     """
     return way_cost(
-        mesh_map.vertices, mesh_map.faces, snapshot.costs, snapshot.edge_cost_factor, positions, point_faces
+        mesh_map.vertices,
+        mesh_map.faces,
+        snapshot.costs,
+        snapshot.edge_cost_factor,
+        np.ascontiguousarray(positions),
+        point_faces,
     )

@@ -38,7 +38,7 @@ from mbf_costmap_nav.kernels.car.motion_primitives import (
     weight_of,
 )
 from mbf_costmap_nav.kernels.car.state_tree import StateTree, best_state, new_tree, with_state
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.compiled import Count, kernel
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FOUND
 
 Heap = list[tuple[float, int]]
@@ -78,7 +78,7 @@ def _grow(
         bin_reached = _bin_of(ground, car, reached)
         known = best_state(tree, bin_reached)
         g_known = tree.g[known] / WORTH_WHILE if known >= 0 else np.inf
-        g_before = tree.g[state] + change_of(car, direction_of(tree.motions[state]), direction)
+        g_before = tree.g[state] + change_of(car, direction_of(Count(tree.motions[state])), direction)
         free_cost = car.step * weight_of(car, steering_of(motion), direction)
         if g_known <= g_before + free_cost:
             continue
@@ -142,8 +142,8 @@ def hybrid_search(
         How many were made.
     """
     start, goal = from_goal.pose, from_start.pose
-    tree = new_tree(start, _bin_of(ground, car, start), NO_MOTION)
-    other = new_tree(goal, _bin_of(ground, car, goal), NO_MOTION)
+    tree = new_tree(start, _bin_of(ground, car, start), Count(NO_MOTION))
+    other = new_tree(goal, _bin_of(ground, car, goal), Count(NO_MOTION))
     heap, other_heap = [(0.0, 0)], [(0.0, 0)]
     waits, other_waits = np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.int64)
     joint = Joint(np.full(1, np.inf), np.zeros(2, dtype=np.int64), np.zeros((5, 2)))

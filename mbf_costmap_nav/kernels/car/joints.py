@@ -16,7 +16,7 @@ from mbf_costmap_nav.kernels.car.motion_primitives import (
     direction_of,
 )
 from mbf_costmap_nav.kernels.car.state_tree import StateTree, best_state
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.compiled import Count, kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ def _join(
     if limit <= 0.0:
         return
     word = curve_between(first.poses[a], second.poses[b], car.radius, car.reversing)
-    before, after = direction_of(first.motions[a]), direction_of(second.motions[b])
+    before, after = direction_of(Count(first.motions[a])), direction_of(Count(second.motions[b]))
     cost = curve_cost(ground, car, first.poses[a], word, before, after, limit)
     if cost < limit:
         joint.cost[0] = first.g[a] + cost + second.g[b]
@@ -90,7 +90,7 @@ def _ancestor(tree: StateTree, state: int, generations: int) -> int:
     """State so many arcs nearer to the root, or the root."""
     for _ in range(generations):
         if tree.parents[state] >= 0:
-            state = tree.parents[state]
+            state = Count(tree.parents[state])
     return state
 
 
@@ -113,7 +113,7 @@ def try_joints(
     waits[0] -= 1
     if waits[0] <= 0:
         waits[0] = int(heuristic(ground, car, side, tree.poses[state], target) / (2.0 * car.step))
-        _join(ground, car, side, tree, other, (state, 0), joint)
+        _join(ground, car, side, tree, other, (state, Count(0)), joint)
     met = best_state(other, tree.bins[state])
     if met < 0:
         return

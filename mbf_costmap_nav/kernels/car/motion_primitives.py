@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mbf_costmap_nav.kernels.car.curves import drive, sample_word
 from mbf_costmap_nav.kernels.car.ground import Ground, driven_cost
 from mbf_costmap_nav.kernels.car.state_tree import StateTree
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.compiled import Count, kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -109,7 +109,7 @@ def path_from_root(tree: StateTree, last: int, side: float, car: Car) -> FloatAr
     state = last
     for arc in range(arcs - 1, -1, -1):
         begin, parent = 1 + arc * car.pieces, tree.parents[state]
-        sample_arc(tree.poses[parent], tree.motions[state], side, car, path[begin : begin + car.pieces])
+        sample_arc(tree.poses[parent], Count(tree.motions[state]), side, car, path[begin : begin + car.pieces])
         state = parent
     return path
 

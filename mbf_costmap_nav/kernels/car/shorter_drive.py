@@ -24,20 +24,19 @@ SHORTEST_WINDOW = 16
 """Poses of the last windows."""
 WORTH_WHILE = 0.99
 """A curve must cost at most this part of what it replaces."""
-NO_SAMPLES = np.zeros((0, 2))
 
 
 @kernel
 def drive_costs(ground: Ground, car: Car, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Cost (n,) [m] from the first pose of a path (n, 3) to each, and the direction (n,) in which it is reached."""
-    costs, directions = np.zeros(len(poses)), np.zeros(len(poses))
+    costs, directions, no_samples = np.zeros(len(poses)), np.zeros(len(poses)), np.empty((0, 2))
     for i in range(1, len(poses)):
         dx, dy = poses[i, 0] - poses[i - 1, 0], poses[i, 1] - poses[i - 1, 1]
         turn = poses[i, 2] - poses[i - 1, 2]
         heading = poses[i - 1, 2] + 0.5 * turn
         directions[i] = 1.0 if np.cos(heading) * dx + np.sin(heading) * dy >= 0.0 else -1.0
         steering = 0.0 if abs(turn) < 1e-9 else 1.0
-        cell = max(0, pose_cost(ground.cells, ground.unknown, ground.geometry, NO_SAMPLES, poses[i]))
+        cell = max(0, pose_cost(ground.cells, ground.unknown, ground.geometry, no_samples, poses[i]))
         length = np.hypot(dx, dy) * weight_of(car, steering, directions[i]) * (1.0 + car.cost_factor * cell / 252.0)
         costs[i] = costs[i - 1] + change_of(car, directions[i - 1], directions[i]) + length
     return costs, directions

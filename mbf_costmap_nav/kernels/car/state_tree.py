@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.compiled import Count, kernel
 
 FIRST_CAPACITY = 4096
 NO_STATE = -1
@@ -51,8 +51,8 @@ class StateTree(NamedTuple):
 @kernel
 def new_tree(pose: NDArray[np.float64], bin_of_pose: int, motion: int) -> StateTree:
     """Tree that is only a root."""
-    tree = _empty_tree(FIRST_CAPACITY)
-    return with_state(tree, pose, 0.0, bin_of_pose, NO_STATE, motion)
+    tree = _empty_tree(Count(FIRST_CAPACITY))
+    return with_state(tree, pose, 0.0, bin_of_pose, Count(NO_STATE), Count(motion))
 
 
 @kernel
@@ -81,7 +81,7 @@ def _slot_of(tree: StateTree, bin_of_pose: int) -> int:
 @kernel
 def best_state(tree: StateTree, bin_of_pose: int) -> int:
     """Best state of a bin, or NO_STATE."""
-    return int(tree.slots[_slot_of(tree, bin_of_pose)])
+    return int(Count(tree.slots[_slot_of(tree, bin_of_pose)]))
 
 
 @kernel

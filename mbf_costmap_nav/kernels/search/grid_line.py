@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.compiled import Count, kernel
 from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid
 
 
@@ -69,7 +69,7 @@ def pull_string(grid: PaddedGrid, path: NDArray[np.int32]) -> NDArray[np.int32]:
         kept[0] = current[0]
         count = 1
         for i in range(1, current.size - 1):
-            before, here, after = kept[count - 1], current[i], current[i + 1]
+            before, here, after = Count(kept[count - 1]), Count(current[i]), Count(current[i + 1])
             direct = line_cost(grid, before, after)
             around = line_cost(grid, before, here) + line_cost(grid, here, after)
             if direct <= around:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.compiled import Count, kernel
 from mbf_costmap_nav.kernels.search.padded_grid import SQRT2, PaddedGrid
 
 GRADIENT_STEP = 0.5
@@ -81,7 +81,7 @@ def _interpolated_gradient(g: NDArray[np.float32], stride: int, x: float, y: flo
             corner = (y0 + j) * stride + x0 + i
             weight = (1.0 - abs(x - x0 - i)) * (1.0 - abs(y - y0 - j))
             if weight > 0.0 and g[corner] < np.inf:
-                slope_x += weight * _slope(g, corner, 1)
+                slope_x += weight * _slope(g, corner, Count(1))
                 slope_y += weight * _slope(g, corner, stride)
     return slope_x, slope_y
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.compiled import Count, kernel
 from mbf_costmap_nav.kernels.search.open_list import IDLE
-from mbf_costmap_nav.kernels.search.padded_grid import INF, SQRT2, Integer
+from mbf_costmap_nav.kernels.search.padded_grid import INF, SQRT2
 from mbf_costmap_nav.kernels.search.search_cells import (
     CAME_BITS,
     CAME_SHIFT,
@@ -38,7 +38,7 @@ def _relax(
     count: np.uint64,
     neighbour: np.uint64,
     reached: np.float32,
-    direction: Integer,
+    direction: int,
 ) -> np.uint64:
     """Lower ``g`` of a neighbour to ``reached`` and note it with its step; returns the count of noted cells."""
     known = records[neighbour].g
@@ -101,20 +101,22 @@ def relax_bucket(
         if state & PLAIN != 0 and direction != NOWHERE:
             step = here + here
             if direction < 4:
-                count = _relax(records, fresh, came, count, cell + natural[direction, 0], g_cell + step, direction)
+                count = _relax(
+                    records, fresh, came, count, cell + natural[direction, 0], g_cell + step, Count(direction)
+                )
             else:
                 ahead, along_x, along_y = natural[direction]
                 in_x, in_y = direction & np.uint32(1), np.uint32(2) | (direction & np.uint32(2)) >> np.uint32(1)
-                count = _relax(records, fresh, came, count, cell + ahead, g_cell + SQRT2 * step, direction)
-                count = _relax(records, fresh, came, count, cell + along_x, g_cell + step, in_x)
-                count = _relax(records, fresh, came, count, cell + along_y, g_cell + step, in_y)
+                count = _relax(records, fresh, came, count, cell + ahead, g_cell + SQRT2 * step, Count(direction))
+                count = _relax(records, fresh, came, count, cell + along_x, g_cell + step, Count(in_x))
+                count = _relax(records, fresh, came, count, cell + along_y, g_cell + step, Count(in_y))
             continue
         east, west = _traversal(records, halves, cell + one), _traversal(records, halves, cell - one)
         north, south = _traversal(records, halves, cell + row), _traversal(records, halves, cell - row)
-        count = _relax(records, fresh, came, count, cell + one, g_cell + here + east, 0)
-        count = _relax(records, fresh, came, count, cell - one, g_cell + here + west, 1)
-        count = _relax(records, fresh, came, count, cell + row, g_cell + here + north, 2)
-        count = _relax(records, fresh, came, count, cell - row, g_cell + here + south, 3)
+        count = _relax(records, fresh, came, count, cell + one, g_cell + here + east, Count(0))
+        count = _relax(records, fresh, came, count, cell - one, g_cell + here + west, Count(1))
+        count = _relax(records, fresh, came, count, cell + row, g_cell + here + north, Count(2))
+        count = _relax(records, fresh, came, count, cell - row, g_cell + here + south, Count(3))
         for neighbour, sides, direction in (
             (cell + row + one, north + east, 4),
             (cell + row - one, north + west, 5),
@@ -122,7 +124,9 @@ def relax_bucket(
             (cell - row - one, south + west, 7),
         ):
             diagonal = g_cell + SQRT2 * (here + _traversal(records, halves, neighbour))
-            count = _relax(records, fresh, came, count, neighbour, diagonal if sides <= side_limit else INF, direction)
+            count = _relax(
+                records, fresh, came, count, neighbour, diagonal if sides <= side_limit else INF, Count(direction)
+            )
     return count
 
 
@@ -164,5 +168,5 @@ def relax_interpolated(
             d = min(abs(low_x - low_y) / traversal, full)
             share = min(least + d * (slope + d * square), full)
             reached = min(low_x, low_y) + traversal * share
-            count = _relax(records, fresh, came, count, neighbour, reached, NOWHERE)
+            count = _relax(records, fresh, came, count, neighbour, reached, Count(NOWHERE))
     return count

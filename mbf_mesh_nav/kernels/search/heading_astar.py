@@ -129,7 +129,7 @@ def search_with_heading(
         vertex, heading = state // HEADINGS, state % HEADINGS
         for i in range(len(targets)):
             if targets[i] == vertex:
-                turn = 0 if target_headings[i] < 0 else _shortest_turn(heading, target_headings[i])
+                turn = 0 if target_headings[i] < 0 else _shortest_turn(heading, Count(target_headings[i]))
                 total = distances[state] + target_offsets[i] + turning_cost * HEADING_STEP * abs(turn)
                 if total < best_total and _may_turn(allowed, vertex, heading, turn):
                     best_state, best_total = state, total

@@ -22,7 +22,8 @@ _MAX_TRIES_A_FACE = 50
 @kernel
 def pass_vertices(mesh: FreeFaces, corridor: IntArray, start: Vector, goal: Vector) -> tuple[FloatArray, IntArray]:
     """Shortest geodesic that vertices passed on their other side lead to; arguments and result of ``straighten``."""
-    points, corridor = straighten(mesh, corridor, start, goal, True)
+    may_turn = bool(Count(1))  # a plain True makes numba compile ``straighten`` for this constant, too
+    points, corridor = straighten(mesh, corridor, start, goal, may_turn)
     length, index, tries = path_length(points), Count(0), _MAX_TRIES_A_FACE * len(corridor)
     while index < len(corridor) - 1 and tries > 0:
         is_shorter = False
@@ -40,7 +41,7 @@ def pass_vertices(mesh: FreeFaces, corridor: IntArray, start: Vector, goal: Vect
                 continue
             tries -= 1
             other = turned_corridor(mesh, corridor, vertex, index, last, side)
-            found, found_corridor = straighten(mesh, other, start, goal, True)
+            found, found_corridor = straighten(mesh, other, start, goal, may_turn)
             if path_length(found) < _SHORTER * length:
                 points, corridor, length, is_shorter = found, found_corridor, path_length(found), True
                 break
