@@ -68,7 +68,9 @@ def ground_of(cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, samp
     inflate(tight, seeds, (0, 0, width, height), np.ones(radius * radius + 1, dtype=np.uint8), radius, 1)
     for border in (tight[:radius], tight[-radius:], tight[:, :radius], tight[:, -radius:]):
         border[:] = 1
-    return Ground(cells, unknown, geometry, np.ascontiguousarray(samples[order]), discs, tight)
+    shown = cells.view()
+    shown.flags.writeable = False  # as a snapshot's are: another type for numba, and all kernels compiled for both
+    return Ground(shown, unknown, geometry, np.ascontiguousarray(samples[order]), discs, tight)
 
 
 def _disc_centres(samples: FloatArray) -> FloatArray:

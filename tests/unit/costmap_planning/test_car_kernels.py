@@ -56,6 +56,14 @@ def test_where_no_obstacle_is_near_the_short_answer_is_the_full_one(seed, length
         assert fitting_cost(ground, pose) == pose_cost(cells, 252, geometry, samples, pose)
 
 
+def test_kernels_get_the_cells_of_a_ground_read_only_whose_ever_they_are():
+    cells = np.zeros((20, 20), dtype=np.uint8)
+    ground = ground_of(cells, 252, np.array([0.1, 0.0, 0.0]), POINT)
+    cells[3, 4] = 254
+    assert not ground.cells.flags.writeable
+    assert ground.cells[3, 4] == 254, "they are the same cells"
+
+
 @settings(max_examples=50, deadline=None)
 @given(seed=seeds, radius=st.floats(0.3, 8.0), side=st.sampled_from([FORWARD_SIDE, BACKWARD_SIDE]))
 def test_arcs_are_joined_without_a_gap_and_turn_by_their_length(seed, radius, side):
