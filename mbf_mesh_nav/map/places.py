@@ -7,6 +7,12 @@ are the vertices below it that are connected to the place it stands on, so the s
 - LETHAL: the disc (of a point: the nearest vertex) touches a lethal vertex or one whose cost is infinite or NaN.
 - INSCRIBED: a robot whose centre is at the point, or somewhere below the disc, would touch one.
 
+The map knows at its vertices where the disc touches something, and between them not more: where it touches nothing at
+any corner of the face (or at both ends of the edge) that carries its middle, it touches nothing, unless an edge of it
+is longer than the disc's radius. So between two free vertices it may come nearer to what is lethal, by up to an eighth
+of its radius. Planners take the costs of the ``inflation`` layer for where it touches nothing; beside posts and corners
+the distances of that are up to a fifth too long, and a vertex that it leaves free may be LETHAL here.
+
 Deviation from the costmap's answers: a disc has no heading, hence ``angle_tolerance`` never matters.
 """
 
@@ -29,6 +35,9 @@ from mbf_mesh_nav.mesh.topology import MeshTopology
 SURFACE_DISTANCE = 0.5
 """How far [m] a position may be off the surface to count as on it; less than a storey, more than a wheel."""
 
+ON_EDGE = 1e-12
+"""Share of a corner up to which a place lies on the edge opposite to it."""
+
 OUTSIDE = PlaceAnswer(CellState.OUTSIDE, 0.0)
 
 
@@ -46,12 +55,12 @@ class MeshPlaces:
         place = self._on_surface(point)
         if place is None:
             return OUTSIDE
-        weights = place.barycentric > 1e-12
+        weights = place.barycentric > ON_EDGE
         costs = self.snapshot.costs[self.topology.faces[place.face][weights]]
         cost = float(scalar_products(place.barycentric[weights], costs))
         if self._blocked(np.array([self._nearest_vertex(place)])).any():
             return PlaceAnswer(CellState.LETHAL, cost)
-        touched = self._blocked(self._disc(place, self.inscribed_radius)).any()
+        touched = self._touches(place, self._disc(place, self.inscribed_radius), self.inscribed_radius)
         return PlaceAnswer(CellState.INSCRIBED if touched else CellState.FREE, cost)
 
     def check_pose(self, pose: Pose, query: PlaceQuery) -> PlaceAnswer:
@@ -62,10 +71,11 @@ class MeshPlaces:
         place = self._on_surface(pose)
         if place is None:
             return OUTSIDE
-        vertices = self._disc(place, self.inscribed_radius + query.safety_dist)
+        radius = self.inscribed_radius + query.safety_dist
+        vertices = self._disc(place, radius)
         blocked, costs = self._blocked(vertices), self.snapshot.costs[vertices]
         costs = np.where(blocked, costs * query.lethal_cost_mult, costs)
-        if blocked.any():
+        if self._touches(place, vertices, radius):
             return PlaceAnswer(CellState.LETHAL, float(costs.sum()))
         around = self._disc(place, 2.0 * self.inscribed_radius + query.safety_dist)
         state = CellState.INSCRIBED if self._blocked(around).any() else CellState.FREE
@@ -95,6 +105,21 @@ class MeshPlaces:
 
     def _on_surface(self, pose: Pose) -> SurfacePoint | None:
         return on_surface(self.topology, self.locator, pose.position, SURFACE_DISTANCE)
+
+    def _touches(self, place: SurfacePoint, disc: IntArray, radius: float) -> bool:
+        """Whether the disc of a radius [m] about a place, of which ``disc`` are the vertices, touches something."""
+        if not self._blocked(disc).any():
+            return False
+        mesh = self.topology
+        corners = mesh.faces[place.face][place.barycentric > ON_EDGE].tolist()
+        around = mesh.vertices[corners]
+        if norm(around - np.roll(around, 1, axis=0)).max() > radius:
+            return True
+        graph = (mesh.vertices, mesh.neighbour_offsets, mesh.neighbours)
+        return any(
+            self._blocked(vertices_in_disc(*graph, corner, mesh.vertices[corner], float(radius))).any()
+            for corner in corners
+        )
 
     def _nearest_vertex(self, place: SurfacePoint) -> int:
         return int(self.topology.faces[place.face][np.argmax(place.barycentric)])

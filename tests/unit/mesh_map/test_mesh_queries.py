@@ -170,3 +170,16 @@ def test_a_path_of_which_less_than_no_pose_is_skipped_is_misuse(queries: MapQuer
 def test_a_tolerance_that_is_negative_or_no_number_is_misuse(queries: MapQueries, tolerance: float):
     with pytest.raises(ValueError, match="tolerances must not be negative"):
         queries.find_valid_pose(Pose.planar(2.0, 1.0), tolerance, 0.0)
+
+
+def test_between_vertices_where_the_robot_touches_nothing_it_touches_nothing():
+    """A post lies 0.305 m from both ends of an edge and 0.28 m from its middle; the robot's radius is 0.3 m."""
+    corners = np.array([(-0.12, 0.0, 0.0), (0.12, 0.0, 0.0), (0.0, 0.28, 0.0), (0.0, -0.28, 0.0)])
+    post = {"polygon": ((-0.01, 0.27), (0.01, 0.27), (0.01, 0.29), (-0.01, 0.29))}
+    parameters = MeshMapParameters(layers=[{"name": "post", "type": "keepout"}], inscribed_radius=0.3)
+    faces = [(0, 1, 2), (1, 0, 3)]
+    there = build_mesh_map(parameters, {"post": {"regions": [post]}}, vertices=corners, faces=faces)
+    check = there.pose_check(PlaceQuery())
+    states = [check(Pose.planar(0.0, y)).state for y in (0.0, -0.02, 0.02)]
+    assert states == [CellState.INSCRIBED, CellState.INSCRIBED, CellState.LETHAL]
+    assert there.pose_check(PlaceQuery(safety_dist=0.01))(Pose.planar(0.0, 0.0)).state is CellState.LETHAL
