@@ -3,6 +3,10 @@
 When to use: behind a grid planner (A*, Theta*), before a controller that follows exactly. When not: paths of
 ``costmap.hybrid_astar``, which are drivable already - smoothing ignores headings and would break their curvature.
 
+The result is no worse than the path given: where costs are above ``highest_cost`` it comes no more than a cell nearer
+to obstacles, and the outline is nowhere on worse cells than it was somewhere on the path; where it would be, points
+stay.
+
 The end poses stay, and so do the heights along the path. A path in another frame than the costmap's is smoothed there
 and handed back in its own. A path that drives backward somewhere is handed back unchanged. With ``max_curvature`` the
 weight of the original path is lowered until the largest curvature of the path is below it; if that fails, or if the
@@ -14,12 +18,13 @@ Formula: the gradient smoother of Dolgov et al. 2010 without its Voronoi term, w
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Path
+from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.arithmetic import arctan2
 from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_abstract.maps.refiners.map_refiner import MapRefiner
@@ -28,8 +33,9 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RefineResult
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.control.path_geometry import resample
+from mbf_costmap_nav.grid.collision import footprint_costs
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
-from mbf_costmap_nav.kernels.control.smoothing import relax_path
+from mbf_costmap_nav.kernels.control.smoothing import HIGHEST, costs_near, relax_path
 from mbf_costmap_nav.plugins import CostmapRefiner
 
 FloatArray = NDArray[np.float64]
@@ -39,6 +45,8 @@ SOFTER = 0.25
 ATTEMPTS = 6
 LETHAL_STEP = 0.1
 """Distance [cells] of the places at which the result is looked up."""
+LINES = 2
+"""The cost a point may have is found on so many lines of the path before it and behind it."""
 
 
 class SmootherParameters(PluginParameters):
@@ -48,7 +56,7 @@ class SmootherParameters(PluginParameters):
     smooth_weight: float = parameter(0.35, "Weight of the midpoint of a point's neighbours.", gt=0.0, lt=0.5)
     spacing: float = parameter(0.1, "Largest distance of two poses.", unit="m", gt=0.0, le=5.0)
     highest_cost: int = parameter(
-        200, "Points are not moved to cells of more than this, unless it is better.", ge=0, le=252
+        50, "Points are moved to cells of more than this only where the path has such costs already.", ge=0, le=HIGHEST
     )
     max_curvature: float = parameter(0.0, "Limit of the curvature; 0 = none.", unit="1/m", ge=0.0, le=100.0)
     tolerance: float = parameter(0.001, "Stop when no point moves further in a sweep.", unit="m", gt=0.0, le=1.0)
@@ -67,20 +75,40 @@ class SmootherRefiner(CostmapRefiner, MapRefiner):
         if not costmap.world_to_cells(path.positions)[1].all():
             return RefineResult(RefinePathOutcome.MAP_ERROR, f"the path leaves {costmap}")
         points = resample(path.positions[:, :2], self.parameters.spacing)
-        smoothed = self._drivable(costmap, points, cancel_token)
-        if isinstance(smoothed, RefineResult):
-            return smoothed
         lengths, old_lengths = polyline_lengths(points), polyline_lengths(path.positions[:, :2])
         heights = np.interp(lengths, old_lengths, path.positions[:, 2])
-        flat = Path.from_points(np.column_stack([smoothed, np.zeros(len(smoothed))]))
-        return _with_ends_of(path, np.column_stack([smoothed, heights]), flat.orientations)
+        given = _along(path, points, heights)
+        allowed = self._states(costmap, [*path, *given]).max(axis=0)
+        fixed = np.zeros(len(points), dtype=np.bool_)
+        for attempt in range(1, ATTEMPTS + 1):
+            smoothed = self._drivable(costmap, points, fixed, cancel_token)
+            if isinstance(smoothed, RefineResult):
+                return smoothed
+            refined = _along(path, smoothed, heights)
+            worse = np.flatnonzero((self._states(costmap, refined) > allowed).any(axis=1))
+            if not len(worse) or cancel_token.cancelled:
+                return refined
+            near = attempt * max(self.costmap.footprint.circumscribed_radius, self.parameters.spacing)
+            fixed |= (np.abs(lengths[:, None] - lengths[worse]) <= near).any(axis=1)
+        x, y, _ = refined.positions[worse[0]].tolist()
+        text = f"smoothed, the path would be worse for the robot's outline at ({x:.2f}, {y:.2f}), and is left as it is"
+        return RefineResult(RefinePathOutcome.SUCCESS, text, path)
 
-    def _drivable(self, costmap: Costmap, points: FloatArray, token: CancelToken) -> FloatArray | RefineResult:
+    def _states(self, costmap: Costmap, poses: Iterable[Pose]) -> NDArray[np.int64]:
+        """(n, 2) worst ``CellState`` under the padded outline, which controllers check, and under the plain one."""
+        outlines = self.costmap.footprint, self.costmap.unpadded_footprint
+        places = [(pose.x, pose.y, pose.yaw) for pose in poses]
+        states = [[footprint_costs(costmap, outline, *place).state for outline in outlines] for place in places]
+        return np.array(states, dtype=np.int64)
+
+    def _drivable(
+        self, costmap: Costmap, points: FloatArray, fixed: NDArray[np.bool_], token: CancelToken
+    ) -> FloatArray | RefineResult:
         """Smoothed points (n, 2) [m] below the largest curvature and off lethal cells, or the reason of a failure."""
         p = self.parameters
         data_weight = p.data_weight
         for _ in range(ATTEMPTS):
-            smoothed = self._smooth(costmap, points, data_weight, token)
+            smoothed = self._smooth(costmap, points, fixed, data_weight, token)
             curvature = curvatures(smoothed)
             if token.cancelled or p.max_curvature == 0.0 or curvature.max() <= p.max_curvature:
                 break
@@ -96,15 +124,24 @@ class SmootherRefiner(CostmapRefiner, MapRefiner):
         text = f"the path runs through a lethal cell at ({lethal[0]:.2f}, {lethal[1]:.2f}), smoothed or not"
         return RefineResult(RefinePathOutcome.FAILURE, text)
 
-    def _smooth(self, costmap: Costmap, points: FloatArray, data_weight: float, token: CancelToken) -> FloatArray:
+    def _smooth(
+        self,
+        costmap: Costmap,
+        points: FloatArray,
+        fixed: NDArray[np.bool_],
+        data_weight: float,
+        token: CancelToken,
+    ) -> FloatArray:
         p = self.parameters
         origin = (costmap.origin_x, costmap.origin_y)
+        in_cells = (points - origin) / costmap.resolution
         cells, _ = relax_path(
             costmap.cells,
-            (points - origin) / costmap.resolution,
+            in_cells,
             data_weight,
             p.smooth_weight,
-            p.highest_cost,
+            np.maximum(costs_near(costmap.cells, in_cells, LINES), p.highest_cost),
+            fixed,
             p.tolerance / costmap.resolution,
             p.max_sweeps,
             token.flag,
@@ -112,11 +149,12 @@ class SmootherRefiner(CostmapRefiner, MapRefiner):
         return np.asarray(cells * costmap.resolution + origin)
 
 
-def _with_ends_of(path: Path, positions: FloatArray, orientations: FloatArray | None) -> Path:
-    """Path of these poses, with exactly the first and the last one of the given path."""
-    assert path.orientations is not None and orientations is not None
-    positions[[0, -1]], orientations = path.positions[[0, -1]], orientations.copy()
-    orientations[[0, -1]] = path.orientations[[0, -1]]
+def _along(path: Path, points: FloatArray, heights: FloatArray) -> Path:
+    """Path through points (n, 2) that looks along them, with exactly the first and the last pose of the given path."""
+    flat = Path.from_points(np.column_stack([points, np.zeros(len(points))]))
+    assert path.orientations is not None and flat.orientations is not None
+    positions, orientations = np.column_stack([points, heights]), flat.orientations.copy()
+    positions[[0, -1]], orientations[[0, -1]] = path.positions[[0, -1]], path.orientations[[0, -1]]
     return Path(positions, orientations, path.frame_id, path.stamp)
 
 

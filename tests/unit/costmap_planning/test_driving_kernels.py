@@ -1,5 +1,6 @@
 """The kernels of critics, footprints, the smoother and the sonar against slow twins in plain Python."""
 
+import itertools
 import math
 
 import numpy as np
@@ -19,7 +20,7 @@ from mbf_costmap_nav.kernels.control.critics import (
     mean_of,
 )
 from mbf_costmap_nav.kernels.control.rollout import blend
-from mbf_costmap_nav.kernels.control.smoothing import relax_path
+from mbf_costmap_nav.kernels.control.smoothing import costs_near, relax_path
 from mbf_costmap_nav.kernels.map.footprint_cost import OUTSIDE, footprint_cost
 from mbf_costmap_nav.kernels.map.line_cells import cost_along
 from mbf_costmap_nav.kernels.map.sonar import FADE_DISTANCE, LEAST_PROBABILITY, occupied_given_reading, update_cone
@@ -90,19 +91,38 @@ def test_the_relaxed_path_is_that_of_the_plain_sweeps(seed):
     rng = np.random.default_rng(seed)
     cells = rng.choice([0, 150, 254], (16, 16), p=[0.7, 0.2, 0.1]).astype(np.uint8)
     points = rng.uniform(1.0, 15.0, (9, 2))
-    relaxed, sweeps = relax_path(cells, points, 0.1, 0.35, 100, 0.0, 15, NOT_CANCELED)
+    limits, fixed = np.array([0, 100, 100, 0, 200, 252, 100, 150, 0]), np.arange(9) == 5
+    relaxed, sweeps = relax_path(cells, points, 0.1, 0.35, limits, fixed, 0.0, 15, NOT_CANCELED)
     expected = points.copy()
     for _ in range(15):
-        for before, here, after, origin in zip(expected, expected[1:], expected[2:], points[1:], strict=False):
+        for index in (1, 2, 3, 4, 6, 7):
+            before, here, after = expected[index - 1 : index + 2]
+            origin = points[index]
             moved = here + 0.1 * (origin - here) + 0.35 * (before + after - 2 * here)
             old, new = (
                 max(cost_along(cells, 0, *before, *place), cost_along(cells, 0, *place, *after))
                 for place in (here, moved)
             )
-            if new <= 100 or new < old:
+            if new <= limits[index] or new < old:
                 here[:] = moved
     assert sweeps == 15
     np.testing.assert_allclose(relaxed, expected, atol=1e-9)
+
+
+@given(seeds)
+@settings(max_examples=20, deadline=None)
+def test_the_costs_near_a_path_are_those_of_the_cells_around_its_lines(seed):
+    rng = np.random.default_rng(seed)
+    cells = rng.integers(0, 256, (12, 12)).astype(np.uint8)
+    points = rng.uniform(0.0, 12.0, (6, 2))
+    known = np.where(cells < 255, np.minimum(cells, 252), 0)
+    of_lines = []
+    for before, after in itertools.pairwise(points):
+        parts = int(2.0 * np.abs(after - before).max()) + 1
+        places = np.floor(np.linspace(before, after, parts + 1)).astype(int)
+        of_lines.append(max(known[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].max() for x, y in places))
+    expected = [max(of_lines[max(i - 2, 0) : i + 2]) for i in range(6)]
+    assert costs_near(cells, points, 2).tolist() == expected
 
 
 # --------------------------------------------------------------------------------------------------- sonar
