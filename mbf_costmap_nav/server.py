@@ -18,6 +18,7 @@ import numpy as np
 from mbf_abstract.config.configuration import Config, PluginDeclaration
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.config.registry import Adapter
+from mbf_abstract.events import EventKind
 from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.maps.view import FloorMap, GridView
 from mbf_abstract.parameters import ParameterModel, parameter
@@ -26,6 +27,7 @@ from mbf_abstract.server.map_server import MapServer
 from mbf_costmap_nav.files.map_description import MapError
 from mbf_costmap_nav.files.map_io import load_map
 from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
+from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.map.static_maps import StaticMaps
@@ -77,6 +79,14 @@ class CostmapNavigationServer(MapServer):
 
     global_costmap: LayeredCostmap
     local_costmap: LayeredCostmap
+
+    def load_map(self, config: Config) -> None:
+        """Build the maps, and note where they have different outlines of the robot."""
+        super().load_map(config)
+        of_plans, of_motions = (one.unpadded_footprint for one in (self.global_costmap, self.local_costmap))
+        drives = any(spec.kind is PluginKind.CONTROLLER for spec in config.plugins)
+        if drives and not np.array_equal(of_plans.vertices, of_motions.vertices):
+            self.runtime.events.emit(EventKind.MAP, self.local_view, message=_two_outlines(of_plans, of_motions))
 
     def serve_maps(self, config: Config) -> Iterator[ServedMap[Any]]:
         """Build the global costmap, then the local one."""
@@ -166,3 +176,12 @@ class CostmapNavigationServer(MapServer):
         )
         frequency, tolerance = parameters.update_frequency, parameters.transform_tolerance
         return ServedMap(costmap, self.runtime, key, parameters, frequency, tolerance)
+
+
+def _two_outlines(of_plans: Footprint, of_motions: Footprint) -> str:
+    """What is suspicious about an outline on the global map and another one on the local map."""
+    here, there = of_motions.circumscribed_radius, of_plans.circumscribed_radius
+    return (
+        f"local_costmap: the robot's outline, {here:.3g} m to its farthest corner, is another one on global_costmap, "
+        f"{there:.3g} m: what fits on one map may be refused on the other; give both the same robot_radius or footprint"
+    )

@@ -54,7 +54,7 @@ class Footprint:
         if points.size == 0:
             points = points.reshape(0, 2)
         if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
-            raise ValueError(f"a footprint is a list of finite [x, y] points, got shape {points.shape}")
+            raise ValueError(f"a list of finite [x, y] points, not one of shape {points.shape}")
         points.flags.writeable = False
         self.vertices: FloatArray = points
         self.inscribed_radius, self.circumscribed_radius = _radii(points)
@@ -83,7 +83,7 @@ class Footprint:
             raise ValueError(f"a footprint needs at least 3 points, got {len(points)}")
         footprint = cls(points)
         if problem := outline_problem(footprint.vertices):
-            raise ValueError(f"a footprint is {problem}")
+            raise ValueError(problem)
         return footprint
 
     def at(self, x: float, y: float, yaw: float) -> FloatArray:

@@ -87,3 +87,16 @@ def test_a_mesh_whose_inflation_is_made_for_a_narrower_robot_is_refused():
     text = r"'inflation': inflation_radius of at least the robot's radius \(mesh_map.inscribed_radius\), 1.5 m"
     with pytest.raises(LayerListError, match=text):
         build_mesh_map(parameters, {"inflation": {"inflation_radius": 0.6}}, vertices=vertices, faces=faces)
+
+
+def test_two_outlines_of_one_robot_are_noted_where_something_drives(folder):
+    text = COSTMAPS.replace("local_costmap: *map", "local_costmap: {robot_radius: 0.2}")
+    (folder / "server.yaml").write_text("backend: costmap\n" + text)
+    noted = "local_costmap: the robot's outline, 0.2 m to its farthest corner, is another one on global_costmap, 1.5 m"
+    assert noted not in mbf("check", folder / "server.yaml").output
+    for local, expected in (("{robot_radius: 0.2}", True), ("*map", False)):
+        controllers = "controllers: [{name: pursuit, type: regulated_pure_pursuit}]\n"
+        text = COSTMAPS.replace("local_costmap: *map", f"local_costmap: {local}")
+        (folder / "server.yaml").write_text("backend: costmap\n" + text + controllers)
+        checked = mbf("check", folder / "server.yaml")
+        assert checked.exit_code == 0 and (noted in " ".join(checked.output.split())) is expected, checked.output
