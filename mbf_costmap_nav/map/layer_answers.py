@@ -58,7 +58,7 @@ class LayerAnswers(SnapshotAnswers):
         return next((f"layer {name!r}: {reason}" for name, reason in reasons if reason), "")
 
     def configuration_warnings(self) -> list[str]:
-        """What is legal but hardly meant: of each layer, and that none inflates around a robot that is no point."""
+        """What is legal but hardly meant: of each layer, none that inflates, and a window smaller than the robot."""
         with self._lock:
             warnings = self.layers.configuration_warnings()
             inflates = any(hasattr(layer.parameters, "inflation_radius") for layer in self.layers.enabled)
@@ -66,6 +66,11 @@ class LayerAnswers(SnapshotAnswers):
                 radius = f"{self.inscribed_radius:.2f} m"
                 text = f"no inflation layer: planners treat the robot, whose inscribed radius is {radius}, as a point"
                 warnings.append(text)
+            grid, reach = self.geometry, self.footprint.circumscribed_radius
+            nearest = 0.5 * grid.resolution * min(grid.width, grid.height)
+            if self.rolling_window and nearest < reach:
+                text = f"the window ends {nearest:.3g} m from the robot's base, but the outline reaches {reach:.3g} m"
+                warnings.append(f"{text}: what the robot touches beyond it is not seen; make width and height larger")
             return warnings
 
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:

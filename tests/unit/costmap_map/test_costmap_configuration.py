@@ -176,6 +176,14 @@ def test_a_robot_on_a_map_without_inflation_is_reported_and_a_point_is_not(build
     assert build("static").configuration_warnings() == build(robot_radius=0.5).configuration_warnings() == []
 
 
+@pytest.mark.parametrize(("width", "reported"), [(4.0, True), (8.0, False)])
+def test_a_window_smaller_than_the_robot_is_reported(build, width, reported):
+    window = {"robot_radius": 3.0, "rolling_window": True, "width": width, "height": 20.0}
+    warnings = build("inflation", inflation={"inflation_radius": 3.0}, **window).configuration_warnings()
+    text = "the window ends 2 m from the robot's base, but the outline reaches 3 m: what the robot touches"
+    assert [one.startswith(text) for one in warnings] == [True] * reported
+
+
 def test_the_limit_of_cells_is_a_parameter_for_grids_maps_and_masks(tmp_path):
     Image.fromarray(np.full((20, 30), 254, dtype=np.uint8)).save(tmp_path / "map.png")
     (tmp_path / "map.yaml").write_text("{image: map.png, resolution: 0.1, origin: [0, 0, 0]}")
