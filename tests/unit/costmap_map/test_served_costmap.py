@@ -203,5 +203,6 @@ def test_a_recovery_stands_while_its_map_is_not_current(start):
 def test_a_map_whose_inflation_is_narrower_than_the_robot_is_served_with_a_warning(start):
     events = EventBus(lambda: 0.0, [MemorySink()])
     start(local="{robot_radius: 0.6, layers: [{name: i, type: inflation}], i: {inflation_radius: 0.3}}", events=events)
-    (note,) = [one for one in events.memory.of_kind(EventKind.MAP) if one.source == "local_costmap"]
-    assert "smaller than the inscribed radius" in note.data["message"]
+    narrow, outlines = [one for one in events.memory.of_kind(EventKind.MAP) if one.source == "local_costmap"]
+    assert "smaller than the inscribed radius" in narrow.data["message"]
+    assert "is another one on global_costmap, 0.2 m" in outlines.data["message"]
