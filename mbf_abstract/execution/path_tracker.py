@@ -31,12 +31,10 @@ LEADS_AWAY = (1.5, 0.1)
 SAME_PLACE = 0.3
 """A robot joins a path at the earliest place that is at most this much farther off [m] than the nearest one."""
 ARM, GAINED = 0.2, 0.2
-"""A path turns back on itself where two of its points, ``ARM`` [m] before and behind, are nearer than ``GAINED`` [m].
-
-That is a turn of 120 degrees; on a smooth bend, one of a radius below 0.11 m.
-"""
+"""A path turns back on itself where two of its points, ``ARM`` [m] before and behind, are nearer than ``GAINED`` [m]:
+by 120 degrees, or on a smooth bend of a radius below 0.11 m."""
 SHORT_ARM = 0.1
-"""The path leads to a cusp as it does over so much [m] before it."""
+"""The path leads to a cusp as it does over so much [m] before it, if its section is that long."""
 CHUNK = 32
 """Number of segments that are checked in one step."""
 _POSITION_NOISE = 1e-9  # [m]
@@ -76,7 +74,8 @@ class PathTracker:
         self.lengths = polyline_lengths(self.points)
         self.reverse = reverse_segments(path, self.points)
         switches = self.lengths[1:-1][self.reverse[1:] != self.reverse[:-1]]
-        self.cusps: FloatArray = np.unique(np.concatenate([switches, self._turns_back(), self.lengths[-1:]]))
+        turns = [turn for turn in self._turns_back().tolist() if not np.any(np.abs(switches - turn) <= ARM)]
+        self.cusps: FloatArray = np.unique(np.concatenate([switches, turns, self.lengths[-1:]]))
         self.progress, self.deviation, self.cusp_reached = 0.0, 0.0, CUSP_REACHED
         self._joined, self._segment = False, 0
 
@@ -169,8 +168,9 @@ class PathTracker:
         beyond = self.progress + distance - cusp
         if beyond <= 0.0:
             return self.point_at(cusp + beyond)
-        end, before = self.point_at(cusp), self.point_at(max(cusp - SHORT_ARM, 0.0))
-        return np.asarray(end + (end - before) * (beyond / SHORT_ARM))
+        arm = max(min(SHORT_ARM, cusp - self.last_cusp), _POSITION_NOISE)
+        end, before = self.point_at(cusp), self.point_at(cusp - arm)
+        return np.asarray(end + (end - before) * (beyond / arm))
 
     def points_at(self, lengths: FloatArray) -> FloatArray:
         """Points (m, dimensions) of the path at ``lengths`` (m,) [m] along it, clamped to its ends."""

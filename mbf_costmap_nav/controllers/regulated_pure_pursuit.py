@@ -14,6 +14,7 @@ import math
 
 import numpy as np
 
+from mbf_abstract.execution.path_tracker import CUSP_REACHED
 from mbf_abstract.geometry import Path, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.failures import blocked_path, obstacle_text
@@ -21,11 +22,13 @@ from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
     along_path,
+    closely_along_path,
     curves_ahead,
     off_course,
     poses_ahead,
     wider_curves,
 )
+from mbf_abstract.maps.controllers.tight_places import CLOSE_FROM, CLOSELY, TightPlaces
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_costmap_nav.control.path_geometry import look_ahead_point
@@ -44,12 +47,13 @@ class RegulatedPurePursuitController(RegulatedFollower):
     leaves_contacts = True
     _at_goal = False
     _room_to_turn = RoomToTurn()
+    _tight_places = TightPlaces()
     _outline: tuple[Footprint, Footprint] | None = None
     """The costmap's outline without padding, and the one used by the collision check."""
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path; that the robot stood at the end of the last one no longer counts."""
-        self._at_goal, self._room_to_turn = False, RoomToTurn()
+        self._at_goal, self._room_to_turn, self._tight_places = False, RoomToTurn(), TightPlaces()
         return super().set_plan(path)
 
     def parameters_changed(self) -> None:
@@ -77,10 +81,35 @@ class RegulatedPurePursuitController(RegulatedFollower):
         if (turn := self._turn_at_goal(cycle)) is not None:
             return [self._turn(cycle, turn)]
         carrot, backward = self._carrot(cycle), self._backward(cycle)
+        if close := self._closely(cycle, backward):
+            return close
         error = off_course(math.atan2(carrot[1], carrot[0]), backward)
         if self.rotates and abs(error) > self.parameters.rotate_to_heading_min_angle:
             return curves_ahead(self._turn(cycle, error), error, backward)
         return wider_curves(self._drive(cycle, carrot, backward))
+
+    def _closely(self, cycle: ControlCycle, backward: bool) -> list[Twist]:
+        """Motions that creep along the path where a tight place is near ahead; none for a car, or far from the path."""
+        assert self.tracker is not None
+        self.tracker.cusp_reached = CUSP_REACHED
+        if not self.rotates:
+            return []
+
+        def fits(x: float, y: float, yaw: float) -> bool:
+            return not cycle.footprint.collides(cycle.costmap, x, y, yaw)
+
+        if self._tight_places.distance(cycle.tracker, self.parameters.allow_reversing, fits) > CLOSE_FROM:
+            return []
+        close = closely_along_path(cycle.tracker, cycle.request.pose, backward)
+        if close:
+            self.tracker.cusp_reached = CLOSELY
+        return [self._slowed(motion, cycle.request.velocity) for motion in close]
+
+    def _slowed(self, motion: Twist, velocity: Twist) -> Twist:
+        """The same arc as slowly as the robot can drive it by now."""
+        change = self.parameters.acc_lim_x * self.parameters.control_period
+        speed = min(max(motion.vx, velocity.vx - change), velocity.vx + change)
+        return Twist.planar(speed, wz=motion.wz / motion.vx * speed)
 
     def _along_path(self, cycle: ControlCycle) -> list[Twist]:
         """Motions that keep to the path, if the outline fits on it as far as the look-ahead at full speed."""

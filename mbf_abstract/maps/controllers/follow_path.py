@@ -22,6 +22,7 @@ from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
     along_path,
+    closely_along_path,
     curves_ahead,
     off_course,
     poses_ahead,
@@ -163,9 +164,9 @@ class FollowPath(MapPlugin, AbstractController):
         bearing, curvature = self._carrot(pose, tracker)
         error = off_course(bearing, backward)
         tracker.cusp_reached = CUSP_REACHED
-        if self.to_tight_place(pose) <= CLOSE_FROM and (close := along_path(tracker, pose, backward)):
+        if self.to_tight_place(pose) <= CLOSE_FROM and (close := closely_along_path(tracker, pose, backward)):
             tracker.cusp_reached = CLOSELY
-            return [*close[::-1], *wider_curves(close[-1])[1:]]
+            return close
         if abs(error) > p.rotate_to_heading_min_angle:
             return curves_ahead(self._turn(error), error, backward)
         left = max(tracker.to_cusp, gap if tracker.on_last_section else 0.0)

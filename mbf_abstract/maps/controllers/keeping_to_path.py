@@ -161,6 +161,8 @@ class KeepingToPath:
         One that has backed out, and then sampled, would stand at the same place again.
         """
         if stands_now:
+            if self._stood_at is None:
+                self._standing.may_turn_again()
             self._stands_at(pose)
         elif self._stood_at is not None:
             is_ahead = self._follower.remaining <= self._remained - AHEAD

@@ -14,7 +14,7 @@ it gets ahead on its path again.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -27,6 +27,8 @@ AHEAD = 0.05  # m of progress on the path that give back the whole distance
 CREEPING = 0.1  # m/s
 NEAR = (0.2, 0.1)
 """How far [m] ahead on the path the points lie that a robot creeps to where its usual look-ahead is blocked."""
+CLOSE = (0.1, 0.05, 0.2)
+"""How far [m] ahead they lie in a tight place; a manoeuvre may have millimetres to spare, which 0.1 m ahead cuts."""
 LOOKS_ALONG = 0.25 * math.pi
 """At most so far [rad] off the path's direction a robot creeps along it."""
 SMALL_TURN = 0.05
@@ -112,20 +114,28 @@ def curves_ahead(turn: Twist, bearing: float, backward: bool = False) -> list[Tw
     return [turn, *(Twist.planar(speed, wz=math.copysign(CREEPING * curve, turn.wz)) for curve in CURVES)]
 
 
-def along_path(tracker: PathTracker, pose: Pose, backward: bool = False) -> list[Twist]:
+def along_path(
+    tracker: PathTracker, pose: Pose, backward: bool = False, distances: Sequence[float] = NEAR
+) -> list[Twist]:
     """Creeping along arcs to points close ahead on a path seen from above, forward or backward as it is to be driven.
 
     Where the outline fits on the path (``poses_ahead``) these arcs are free although the one to a point farther ahead,
     which cuts the path's corners, is not. None where the robot does not look along the path.
     """
     motions = []
-    for distance in NEAR:
+    for distance in distances:
         x, y = tracker.straight_on(distance).tolist()
         bearing, curvature = arc_to(pose, np.array([x, y, pose.z]))
         if abs(off_course(bearing, backward)) <= LOOKS_ALONG:
             speed = -CREEPING if backward else CREEPING
             motions.append(Twist.planar(speed, wz=speed * curvature))
     return motions
+
+
+def closely_along_path(tracker: PathTracker, pose: Pose, backward: bool = False) -> list[Twist]:
+    """The same to points of ``CLOSE``, then wider curves than to the first of them."""
+    motions = along_path(tracker, pose, backward, CLOSE)
+    return [*motions, *wider_curves(motions[0])[1:]] if motions else []
 
 
 def off_course(bearing: float, backward: bool) -> float:

@@ -1,8 +1,8 @@
 """How long a controller has commanded nothing that gets its robot anywhere.
 
-When to use: in controllers that choose among sampled motions. The best of them may be to stand, or to go to and fro by
-a centimetre, for ever. When not: for what the robot does with its commands; wheels that do not turn, or a guard that
-holds the robot back, are seen by the watches of the core.
+When to use: in controllers that choose among sampled motions. The best of them may be to stand, to go to and fro by a
+centimetre, or to turn round and round, for ever. When not: for what the robot does with its commands; wheels that do
+not turn, or a guard that holds the robot back, are seen by the watches of the core.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ MOVED, TURNED = 0.1, 0.5
 """A robot that is commanded so far [m, rad] from where it began to stand gets on ..."""
 SPAN = 0.5
 """... or as far as its full speed would take it in so long [s], if that is less."""
+ROUND = 2.0 * math.pi
+"""... but having turned so far [rad] in all at one place it has faced every direction: more turns lead nowhere."""
 FORGOTTEN = 1.0
 """A controller that has not been asked for this long [s] begins anew."""
 
@@ -40,12 +42,18 @@ class Standing:
 
     def __init__(self) -> None:
         self._offset = (0.0, 0.0, 0.0)
+        self._faced = self._turned = 0.0
         self._command: Command | None = None
         self._since = self._asked = -math.inf
 
     def restart(self, now: float) -> None:
         """It stands from ``now`` [s] on, at the earliest."""
         self._offset, self._since = (0.0, 0.0, 0.0), now
+        self._faced = self._turned = 0.0
+
+    def may_turn_again(self) -> None:
+        """Let it turn once around from now on: somebody else chooses its turns."""
+        self._turned = 0.0
 
     def commanded(self, command: Command | None) -> None:
         """Take note of the command that holds until the controller is asked again; None = it failed."""
@@ -63,10 +71,14 @@ class Standing:
         if passed > FORGOTTEN:
             self.restart(now)
         elif self._command is not None:
+            before = self._offset[2]
             self._offset = moved_on(self._offset, self._command, passed)
+            self._turned += abs(self._offset[2] - before)
         x, y, yaw = self._offset
-        if math.hypot(x, y) >= min(MOVED, SPAN * speed) or abs(yaw) >= min(TURNED, SPAN * yaw_rate):
+        if math.hypot(x, y) >= min(MOVED, SPAN * speed):
             self.restart(now)
+        elif abs(yaw - self._faced) >= min(TURNED, SPAN * yaw_rate) and self._turned < ROUND:
+            self._faced, self._since = yaw, now
         return now - self._since
 
 

@@ -4,9 +4,10 @@ When to use: in controllers that steer to a point ahead, or sample motions. Both
 that stands in the mouth of a gap beside its path can neither turn nor go on. When not: along one wall; a robot has room
 to the other side there. Nor where something stands on the path; samples lead around it.
 
-Rule: a place is tight where the outline fits on the path, but would touch something ``ROOM`` farther to the left, and
-``ROOM`` farther to the right. Controllers keep to the path from ``REACH`` before such a place on, and closely from
-``CLOSE_FROM`` on, so that the robot has come onto its path where the gap begins.
+Rule: a place is tight where the outline fits on the path, but has less than twice ``ROOM`` to move sideways in all; so
+is a cusp where the robot cannot turn, as a manoeuvre fits only as it was planned. Controllers keep to the path from
+``REACH`` before such a place on, and closely from ``CLOSE_FROM`` on, so that the robot has come onto its path where the
+gap begins.
 """
 
 from __future__ import annotations
@@ -23,13 +24,15 @@ from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 
 ROOM = 0.05
-"""Room [m] to a side that a controller needs which does not drive closely."""
+"""Room [m] to either side that a controller needs which does not drive closely."""
 REACH = 1.5
 """So far [m] ahead on the path it is looked at."""
 CLOSE_FROM = 1.0
 """So far [m] before a tight place the robot is driven closely."""
 SPACING, ARM = 0.1, 0.2
 """Distance [m] of the poses looked at; each looks along the line between the points ``ARM`` before and behind it."""
+HEADINGS = [k * math.pi / 8.0 for k in range(16)]
+"""Where the outline fits with all of these [rad], the robot can turn."""
 CLOSELY = 0.02
 """So near [m] a robot that is driven closely comes to a cusp."""
 KEPT = 0.05
@@ -60,7 +63,8 @@ class TightPlaces:
             poses = _poses_at(tracker, lengths, reverses).tolist()
             first = next((k for k, (x, y, yaw) in enumerate(poses) if not has_room(x, y, yaw, fits)), None)
             is_tight = first is not None and (fits(*poses[first]) or _fits_as_planned(tracker, lengths[first], fits))
-            self._next = float(lengths[first]) if is_tight else math.inf
+            gap = float(lengths[first]) if is_tight else math.inf
+            self._next = min(gap, _next_cusp(tracker, fits))
         return max(self._next - tracker.progress, 0.0)
 
 
@@ -76,16 +80,38 @@ def _poses_at(tracker: PathTracker, lengths: FloatArray, reverses: bool) -> Floa
     return np.column_stack([tracker.points_at(lengths)[:, :2], yaws])
 
 
+def _next_cusp(tracker: PathTracker, fits: Fits) -> float:
+    """Length [m] of the next cusp within ``REACH`` at which the robot cannot turn, but for the end; inf = none."""
+    cusps: list[float] = tracker.cusps[:-1].tolist()
+    for cusp in cusps:
+        if tracker.progress <= cusp <= tracker.progress + REACH:
+            x, y = tracker.point_at(cusp)[:2].tolist()
+            if not all(fits(x, y, yaw) for yaw in HEADINGS):
+                return cusp
+    return math.inf
+
+
 def _fits_as_planned(tracker: PathTracker, length: float, fits: Fits) -> bool:
     """Whether the outline fits with the heading of the pose at ``length`` [m]; near a bend the chord has another."""
-    pose = tracker.path[int(np.argmin(np.abs(tracker.lengths - length)))]
+    nearest = int(np.argmin(np.abs(tracker.lengths - length)))
+    if abs(tracker.lengths[nearest] - length) > SPACING:
+        return False
+    pose = tracker.path[nearest]
     return fits(pose.x, pose.y, pose.yaw)
 
 
 def has_room(x: float, y: float, yaw: float, fits: Fits) -> bool:
-    """Whether a robot at a pose (x, y [m], yaw [rad]) could as well stand ``ROOM`` farther to one side."""
-    left_x, left_y = -ROOM * math.sin(yaw), ROOM * math.cos(yaw)
-    return fits(x + left_x, y + left_y, yaw) or fits(x - left_x, y - left_y, yaw)
+    """Whether a robot at a pose (x, y [m], yaw [rad]) could as well stand up to twice ``ROOM`` to the left or right.
+
+    That is, from ``ROOM`` on one side to ``ROOM`` on the other, or all of it on one side.
+    """
+    side_x, side_y = -ROOM * math.sin(yaw), ROOM * math.cos(yaw)
+
+    def fits_beside(rooms: float) -> bool:
+        return fits(x + rooms * side_x, y + rooms * side_y, yaw)
+
+    left, right = fits_beside(1.0), fits_beside(-1.0)
+    return (left and right) or (left and fits_beside(2.0)) or (right and fits_beside(-2.0))
 
 
 def outline_fits(plugin: MapPlugin, near: Pose, query: PlaceQuery) -> Fits:

@@ -145,6 +145,27 @@ def test_past_a_cusp_and_past_the_end_a_path_is_taken_to_lead_straight_on():
     assert tracker.straight_on(0.7) == pytest.approx((2.4, 0.0, 0.0))
 
 
+def test_past_the_cusp_of_a_stroke_of_few_centimetres_a_path_leads_on_as_the_stroke_does():
+    poses = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.97, 0.01, -0.3), (1.5, -0.15, -0.3)]
+    tracker = PathTracker(Path.from_poses([Pose.planar(*pose) for pose in poses]), dimensions=2)
+    tracker.update((1.0, 0.0))
+    assert tracker.driving_backward and tracker.to_cusp == pytest.approx(math.hypot(0.03, 0.01))
+    ahead = tracker.straight_on(0.5)
+    assert ahead == pytest.approx(np.array([1.0, 0.0]) + 0.5 / math.hypot(0.03, 0.01) * np.array([-0.03, 0.01]))
+
+
+def test_a_cusp_where_the_robot_reverses_is_not_found_a_second_time_because_the_path_turns_back_there():
+    """Forward, three arcs back to the right, and forward to the left, as a search for a car finds it."""
+    poses, strokes = [(0.0, 0.0, 0.0)], [(10, 0.05, 0.0), (3, -0.05, 5.0), (10, 0.05, -5.0)]
+    for count, length, curvature in strokes:
+        for _ in range(count):
+            x, y, yaw = poses[-1]
+            heading = yaw + 0.5 * length * curvature
+            poses.append((x + length * math.cos(heading), y + length * math.sin(heading), yaw + length * curvature))
+    tracker = PathTracker(Path.from_poses([Pose.planar(*pose) for pose in poses]), dimensions=2)
+    assert tracker.cusps == pytest.approx([0.5, 0.65, 1.15], abs=0.01)
+
+
 def test_a_bend_and_a_right_angle_are_no_cusps_and_a_hairpin_is_one():
     angles = np.linspace(0.0, np.pi, 30)
     bend = 0.3 * np.column_stack([np.sin(angles), 1.0 - np.cos(angles), np.zeros(30)])

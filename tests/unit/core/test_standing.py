@@ -46,6 +46,17 @@ def test_a_robot_that_is_told_to_creep_or_to_turn_does_not(command):
     assert stood([command] * 100) < 1.5
 
 
+@pytest.mark.parametrize(
+    "pattern", [[Twist.planar(wz=1.0)], [Twist.planar(wz=1.0)] * 20 + [Twist.planar(wz=-1.0)] * 20]
+)
+def test_a_robot_that_is_told_to_turn_round_and_round_at_one_place_stands(pattern):
+    assert stood(pattern * (400 // len(pattern))) == pytest.approx(20.0 - 2.0 * np.pi, abs=0.6)
+
+
+def test_a_robot_that_comes_away_may_turn_once_more():
+    assert stood(([Twist.planar(wz=1.0)] * 100 + [Twist.planar(0.5)] * 5) * 5) < 1.5
+
+
 def test_it_counts_from_where_the_robot_was_last_told_to_go():
     assert stood([Twist.planar(0.5)] * 100 + [STANDS] * 40) == pytest.approx(2.0, abs=0.3)
 

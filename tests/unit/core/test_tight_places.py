@@ -38,6 +38,11 @@ def test_room_to_one_side_is_room_as_along_a_wall(left, right):
     assert TightPlaces().distance(tracker_at(0.5), True, gap(1.0, 2.0, left, right)) == math.inf
 
 
+@pytest.mark.parametrize(("left", "right"), [(1.4 * ROOM, 0.0), (0.0, 1.4 * ROOM), (1.2 * ROOM, 0.6 * ROOM)])
+def test_a_path_along_one_side_of_a_narrow_gap_is_tight_although_there_is_some_room_to_the_other(left, right):
+    assert TightPlaces().distance(tracker_at(0.5), True, gap(1.0, 2.0, left, right)) == pytest.approx(0.5, abs=0.1)
+
+
 def test_what_stands_on_the_path_is_no_gap():
     assert TightPlaces().distance(tracker_at(0.5), True, lambda x, y, yaw: x < 1.0) == math.inf
 
@@ -50,7 +55,8 @@ def test_a_gap_behind_a_cusp_counts_and_each_stroke_is_looked_at_as_it_is_driven
     tracker.update((0.7, 0.0))
 
     def fits(x, y, yaw):
-        yaws.append(yaw)
+        if x < 0.99:  # at the cusp it is asked whether the robot can turn
+            yaws.append(yaw)
         return gap(0.0, 0.5, 0.02, 0.02)(x, y, yaw)
 
     assert TightPlaces().distance(tracker, True, fits) == pytest.approx(0.3 + 0.5, abs=0.11)
@@ -66,6 +72,31 @@ def test_a_place_that_only_the_heading_of_the_plan_fits_is_no_obstacle():
         return x < 1.0 or (abs(y) < 0.01 and yaw == pytest.approx(0.3))
 
     assert TightPlaces().distance(tracker, True, slanted) == pytest.approx(1.0, abs=0.1)
+
+
+def test_what_stands_between_the_poses_of_a_sparse_path_is_an_obstacle():
+    tracker = tracker_at(0.5, [(0.0, 0.0, 0.0), (4.0, 0.0, 0.0)])
+    assert TightPlaces().distance(tracker, True, lambda x, y, yaw: not 1.0 <= x <= 1.2) == math.inf
+
+
+def out_and_back(at):
+    """A robot at ``at`` [m] on a path 1 m forward along x, and 2 m back."""
+    points = [0.1 * k for k in range(11)] + [0.1 * k for k in range(9, -11, -1)]
+    tracker = PathTracker(Path.from_poses([Pose.planar(x, 0.0, 0.0) for x in points]), dimensions=2)
+    tracker.update((at, 0.0))
+    return tracker
+
+
+def test_a_cusp_where_the_robot_cannot_turn_is_tight_and_one_where_it_can_is_not():
+    def lengthwise(x, y, yaw):
+        return abs(math.sin(yaw)) < 0.5
+
+    assert TightPlaces().distance(out_and_back(0.3), True, lengthwise) == pytest.approx(0.7, abs=0.01)
+    assert TightPlaces().distance(out_and_back(0.3), True, lambda x, y, yaw: True) == math.inf
+
+
+def test_the_end_of_a_path_is_not_tight_because_the_robot_cannot_turn_there():
+    assert TightPlaces().distance(tracker_at(3.5), True, lambda x, y, yaw: abs(math.sin(yaw)) < 0.5) == math.inf
 
 
 def test_an_answer_holds_until_the_robot_has_come_on():
