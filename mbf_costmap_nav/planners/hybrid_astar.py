@@ -14,6 +14,7 @@ within it that can be reached at the goal's heading (exactly, or within half a b
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from typing import ClassVar
 
@@ -24,9 +25,8 @@ from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP
-from mbf_costmap_nav.kernels.search.grid_search import FOUND
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND
 from mbf_costmap_nav.planning.car_search import CarLeg, CarWorld, Driving, search_drive
 from mbf_costmap_nav.planning.grid_planning import check_tolerance, marked_if_permanent, off_map
 from mbf_costmap_nav.planning.path_assembly import heights_along
@@ -36,6 +36,10 @@ FloatArray = NDArray[np.float64]
 
 DEFAULT_RADIUS = 0.5
 """Radius [m] of the tightest curve where neither the parameters nor the robot give one."""
+
+
+ROOMY_STATES = 200_000
+"""A path with some room to spare is searched with at most so many states, before one that only fits."""
 
 
 class HybridAStarParameters(PluginParameters):
@@ -102,9 +106,12 @@ class HybridAStarPlanner(CostmapPlanner):
 
     def _world(self, request: PlanRequest) -> CarWorld:
         costmap, p = self.costmap.snapshot(), self.parameters
-        samples = FootprintCheck(self.costmap.footprint, costmap.resolution).samples
         return CarWorld.build(
-            costmap, samples, request.cancel_token, cost_factor=p.cost_factor, allow_unknown=p.allow_unknown
+            costmap,
+            self.costmap.footprint,
+            request.cancel_token,
+            cost_factor=p.cost_factor,
+            allow_unknown=p.allow_unknown,
         )
 
     def _search(self, world: CarWorld, start: Pose, goal: Pose, tolerance: float) -> CarLeg | None:
@@ -115,9 +122,15 @@ class HybridAStarPlanner(CostmapPlanner):
             if end is None:
                 return None
             goal = Pose((*world.costmap.cell_to_world(*end), goal.z), goal.orientation, goal.frame_id, goal.stamp)
-        return search_drive(
-            world, self._driving(), start, goal, from_start=from_start, wanted=wanted, tolerance=tolerance
-        )
+        # The dearer poses change which states a bin keeps, so a passage hardly wider than the robot may be missed.
+        few = replace(self._driving(), max_states=min(ROOMY_STATES, self.parameters.max_states))
+        for driving, ground in ((few, world.ground(roomy=True)), (self._driving(), None)):
+            leg = search_drive(
+                world, driving, start, goal, from_start=from_start, wanted=wanted, tolerance=tolerance, ground=ground
+            )
+            if leg.status in (FOUND, CANCELED):
+                break
+        return leg
 
     def _driving(self) -> Driving:
         p = self.parameters

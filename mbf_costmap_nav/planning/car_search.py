@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import Pose
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.kernels.car.ground import Ground, ground_of, pose_cost
 from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP, hybrid_search
 from mbf_costmap_nav.kernels.car.joints import HEADINGS, Target
@@ -29,6 +31,8 @@ FloatArray = NDArray[np.float64]
 
 UNKNOWN_AS = 252
 """Cost of the unknown cells that may be driven through, as for the other planners."""
+SPARE = (0.5, 0.2)
+"""Room [cells] around the outline that a path keeps where it can."""
 CELLS_OF_BINS = (2.0, 1.0, 0.5, 0.25)
 """Sides [cells] of the bins, in the order in which they are tried."""
 STATES_THAT_SHOW = 20_000
@@ -93,28 +97,42 @@ class CarLeg:
 
 @dataclass(frozen=True)
 class CarWorld:
-    """One snapshot and the robot on it: footprint ``samples`` (n, 2) [m], and the cost of ``unknown`` cells."""
+    """One snapshot and the robot on it.
+
+    Attributes
+    ----------
+    samples, larger, slightly_larger : (n, 2) float64
+        Of the footprint [m], and of it with ``SPARE`` around it.
+    unknown : int
+        Cost of unknown cells.
+    """
 
     grid: SearchGrid
     samples: FloatArray
+    larger: FloatArray
+    slightly_larger: FloatArray
     unknown: int
 
     @classmethod
     def build(
-        cls, costmap: Costmap, samples: FloatArray, token: CancelToken, *, cost_factor: float, allow_unknown: bool
+        cls, costmap: Costmap, footprint: Footprint, token: CancelToken, *, cost_factor: float, allow_unknown: bool
     ) -> CarWorld:
         """Prepare a snapshot; the other arguments are those of the planner that asks."""
         rules = GridPlannerParameters(cost_factor=cost_factor, allow_unknown=allow_unknown)
-        return cls(SearchGrid.build(costmap, rules, token), samples, UNKNOWN_AS if allow_unknown else LETHAL)
+        outlines = (footprint.offset(spare * costmap.resolution) for spare in (0.0, *SPARE))
+        samples, larger, slightly_larger = (FootprintCheck(one, costmap.resolution).samples for one in outlines)
+        unknown = UNKNOWN_AS if allow_unknown else LETHAL
+        return cls(SearchGrid.build(costmap, rules, token), samples, larger, slightly_larger, unknown)
 
     @property
     def costmap(self) -> Costmap:
         """The snapshot."""
         return self.grid.costmap
 
-    def ground(self) -> Ground:
-        """Prepare footprint checks of many poses."""
-        return ground_of(self.costmap.cells, self.unknown, self.grid.geometry, self.samples)
+    def ground(self, *, roomy: bool = False) -> Ground:
+        """Prepare footprint checks of many poses; ``roomy``: those with little room to spare cost more."""
+        outlines = (self.samples, self.larger, self.slightly_larger) if roomy else (self.samples,)
+        return ground_of(self.costmap.cells, self.unknown, self.grid.geometry, *outlines)
 
     def fits(self, pose: Pose) -> bool:
         """Whether the whole footprint lies on the map and off lethal cells, the centre off inscribed ones."""

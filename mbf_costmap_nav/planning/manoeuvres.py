@@ -132,7 +132,7 @@ class Manoeuvres:
         for reach in REACHES if self.max_states else ():
             pieces: list[tuple[int, int, FloatArray]] = []
             for first, last in stretches(wrong, course.lengths, reach * self.footprint.circumscribed_radius):
-                drive = self._drive(course, first, last)
+                drive = self._drive(course, first, last, everywhere=math.isinf(reach))
                 if drive is None:
                     break
                 pieces.append((first, last, drive))
@@ -166,7 +166,7 @@ class Manoeuvres:
         yaws[wrong] = course.poses[nearest, 2]
         return Fitted(points, yaws)
 
-    def _drive(self, course: Course, first: int, last: int) -> FloatArray | None:
+    def _drive(self, course: Course, first: int, last: int, *, everywhere: bool) -> FloatArray | None:
         """Poses (n, 3) between two poses of a course that the outline can drive; None if none were found."""
         from mbf_costmap_nav.planning.car_search import CarWorld, search_drive  # with kernels that few paths need
 
@@ -177,13 +177,11 @@ class Manoeuvres:
         if last == len(course.poses) - 1 and course.end_yaw is not None:
             ends[1, 2] = course.end_yaw
         start, goal = (Pose.planar(*end) for end in ends.tolist())
-        everywhere = first == 0 and last == len(course.poses) - 1
         window = self.costmap if everywhere else self._around(course.poses[first : last + 1, :2], BESIDE * radius)
         for margin in MARGINS:
             outline = self.footprint.offset(margin * self.costmap.resolution)
-            samples = FootprintCheck(outline, self.costmap.resolution).samples
             world = CarWorld.build(
-                window, samples, self.token, cost_factor=self.cost_factor, allow_unknown=self.allow_unknown
+                window, outline, self.token, cost_factor=self.cost_factor, allow_unknown=self.allow_unknown
             )
             if not (world.fits(start) and world.fits(goal)):
                 continue

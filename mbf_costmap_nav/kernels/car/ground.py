@@ -5,6 +5,8 @@ which ``pose_cost`` alone is enough.
 
 Most poses are far from obstacles, which a look-up of a few cells proves: the ``discs`` cover the footprint, and no
 lethal cell is near the centre of any. The footprint samples are looked at only where one of these cells is ``tight``.
+A pose costs more where a somewhat larger outline does not fit: controllers keep to no path exactly, so none leads along
+a wall without a millimetre to spare if there is room to the other side.
 """
 
 from __future__ import annotations
@@ -25,7 +27,10 @@ FloatArray = NDArray[np.float64]
 
 CELL_DIAGONAL = 1.415
 """Two points are as near as the centres of their cells, give or take half a diagonal [cells] for each."""
+CLOSE_COST = 126
+"""What a pose costs more for each of the larger outlines that does not fit."""
 GOLDEN_RATIO = 0.6180339887498949
+NO_SAMPLES = np.zeros((0, 2))
 
 
 class Ground(NamedTuple):
@@ -40,8 +45,10 @@ class Ground(NamedTuple):
         [m].
     samples : (n, 2) float64
         Footprint samples in the base frame [m], neighbours far apart so that a collision shows early.
+    larger, slightly_larger : (m, 2) float64
+        Samples of outlines with some room to spare, and with less; none = room costs nothing.
     discs : (k, 2) float64
-        Centres [m] of the discs that cover the samples.
+        Centres [m] of the discs that cover all samples.
     tight : (height, width) uint8
         0 where a disc lies on the map and off lethal cells.
     """
@@ -50,15 +57,24 @@ class Ground(NamedTuple):
     unknown: int
     geometry: FloatArray
     samples: FloatArray
+    larger: FloatArray
+    slightly_larger: FloatArray
     discs: FloatArray
     tight: NDArray[np.uint8]
 
 
-def ground_of(cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, samples: FloatArray) -> Ground:
+def ground_of(
+    cells: NDArray[np.uint8],
+    unknown: int,
+    geometry: FloatArray,
+    samples: FloatArray,
+    larger: FloatArray = NO_SAMPLES,
+    slightly_larger: FloatArray = NO_SAMPLES,
+) -> Ground:
     """Prepare a snapshot for footprint samples (n, 2) [m]; the arguments are those of ``Ground``."""
-    order = np.argsort((np.arange(len(samples)) * GOLDEN_RATIO) % 1.0, kind="stable")
-    discs = _disc_centres(samples)
-    gaps = np.hypot(samples[:, None, 0] - discs[None, :, 0], samples[:, None, 1] - discs[None, :, 1])
+    covered = np.concatenate([samples, larger, slightly_larger])
+    discs = _disc_centres(covered)
+    gaps = np.hypot(covered[:, None, 0] - discs[None, :, 0], covered[:, None, 1] - discs[None, :, 1])
     radius = min(LARGEST_RADIUS, math.ceil(gaps.min(axis=1).max() / geometry[0] + CELL_DIAGONAL))
     tight = np.zeros_like(cells)
     if radius == LARGEST_RADIUS:
@@ -70,7 +86,13 @@ def ground_of(cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, samp
         border[:] = 1
     shown = cells.view()
     shown.flags.writeable = False  # as a snapshot's are: another type for numba, and all kernels compiled for both
-    return Ground(shown, unknown, geometry, np.ascontiguousarray(samples[order]), discs, tight)
+    outlines = _far_apart(samples), _far_apart(larger), _far_apart(slightly_larger)
+    return Ground(shown, unknown, geometry, *outlines, discs, tight)
+
+
+def _far_apart(samples: FloatArray) -> FloatArray:
+    """The samples in an order in which neighbours are far apart."""
+    return np.ascontiguousarray(samples[np.argsort((np.arange(len(samples)) * GOLDEN_RATIO) % 1.0, kind="stable")])
 
 
 def _disc_centres(samples: FloatArray) -> FloatArray:
@@ -95,8 +117,13 @@ def pose_cost(
     cost = _centre_cost(cells, unknown, geometry, pose)
     if cost < 0:
         return -1
+    return cost if _fits(cells, geometry, samples, pose) else -1
+
+
+@kernel
+def _fits(cells: NDArray[np.uint8], geometry: FloatArray, samples: FloatArray, pose: FloatArray) -> bool:
     worst = footprint_cost(cells, geometry[0], geometry[1], geometry[2], samples, pose[0], pose[1], pose[2])
-    return -1 if worst == 254 or worst < 0 else cost
+    return bool(0 <= worst < 254 or worst == 255)
 
 
 @kernel
@@ -111,7 +138,7 @@ def _centre_cost(cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, p
 
 @kernel
 def fitting_cost(ground: Ground, pose: FloatArray) -> int:
-    """``pose_cost`` on the ground, faster where no obstacle is near."""
+    """``pose_cost`` on the ground, faster far from obstacles; with ``CLOSE_COST`` where larger outlines do not fit."""
     geometry = ground.geometry
     cost = _centre_cost(ground.cells, ground.unknown, geometry, pose)
     if cost < 0:
@@ -123,7 +150,11 @@ def fitting_cost(ground: Ground, pose: FloatArray) -> int:
         forward, left = ground.discs[i, 0], ground.discs[i, 1]
         ix, iy = int(np.floor(x + c * forward - s * left)), int(np.floor(y + s * forward + c * left))
         if ix < 0 or iy < 0 or ix >= width or iy >= height or ground.tight[iy, ix] != 0:
-            return int(pose_cost(ground.cells, ground.unknown, geometry, ground.samples, pose))
+            if not _fits(ground.cells, geometry, ground.samples, pose):
+                return -1
+            if not _fits(ground.cells, geometry, ground.slightly_larger, pose):
+                return cost + 2 * CLOSE_COST
+            return cost if _fits(ground.cells, geometry, ground.larger, pose) else cost + CLOSE_COST
     return cost
 
 

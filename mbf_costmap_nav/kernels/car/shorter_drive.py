@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.car.curves import curve_between, sample_word
-from mbf_costmap_nav.kernels.car.ground import Ground, pose_cost
+from mbf_costmap_nav.kernels.car.ground import Ground, fitting_cost
 from mbf_costmap_nav.kernels.car.motion_primitives import Car, change_of, curve_cost, weight_of
 from mbf_costmap_nav.kernels.compiled import kernel
 
@@ -29,14 +29,14 @@ WORTH_WHILE = 0.99
 @kernel
 def drive_costs(ground: Ground, car: Car, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Cost (n,) [m] from the first pose of a path (n, 3) to each, and the direction (n,) in which it is reached."""
-    costs, directions, no_samples = np.zeros(len(poses)), np.zeros(len(poses)), np.empty((0, 2))
+    costs, directions = np.zeros(len(poses)), np.zeros(len(poses))
     for i in range(1, len(poses)):
         dx, dy = poses[i, 0] - poses[i - 1, 0], poses[i, 1] - poses[i - 1, 1]
         turn = poses[i, 2] - poses[i - 1, 2]
         heading = poses[i - 1, 2] + 0.5 * turn
         directions[i] = 1.0 if np.cos(heading) * dx + np.sin(heading) * dy >= 0.0 else -1.0
         steering = 0.0 if abs(turn) < 1e-9 else 1.0
-        cell = max(0, pose_cost(ground.cells, ground.unknown, ground.geometry, no_samples, poses[i]))
+        cell = max(0, fitting_cost(ground, poses[i]))
         length = np.hypot(dx, dy) * weight_of(car, steering, directions[i]) * (1.0 + car.cost_factor * cell / 252.0)
         costs[i] = costs[i - 1] + change_of(car, directions[i - 1], directions[i]) + length
     return costs, directions

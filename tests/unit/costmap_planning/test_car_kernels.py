@@ -15,7 +15,7 @@ from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import footprint_samples
 from mbf_costmap_nav.kernels.car.curves import curve_between
-from mbf_costmap_nav.kernels.car.ground import driven_cost, fitting_cost, ground_of, pose_cost
+from mbf_costmap_nav.kernels.car.ground import CLOSE_COST, driven_cost, fitting_cost, ground_of, pose_cost
 from mbf_costmap_nav.kernels.car.motion_primitives import (
     BACKWARD_SIDE,
     FORWARD_SIDE,
@@ -62,6 +62,22 @@ def test_kernels_get_the_cells_of_a_ground_read_only_whose_ever_they_are():
     cells[3, 4] = 254
     assert not ground.cells.flags.writeable
     assert ground.cells[3, 4] == 254, "they are the same cells"
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=seeds, share=st.floats(0.0, 0.05), rooms=st.tuples(st.floats(0.05, 0.4), st.floats(0.0, 0.05)))
+def test_a_pose_costs_more_for_each_larger_outline_that_does_not_fit(seed, share, rooms):
+    rng = np.random.default_rng(seed)
+    cells = np.where(rng.uniform(size=(60, 70)) < share, 254, 7).astype(np.uint8)
+    geometry = np.array([0.1, -2.0, 5.0])
+    sizes = [(0.5 + room, 0.25 + room) for room in (0.0, *rooms)]
+    outlines = [np.array([[a, b], [-a, b], [-a, -b], [a, -b]]) for a, b in sizes]
+    samples, larger, slightly_larger = (footprint_samples(outline, 0.1) for outline in outlines)
+    ground = ground_of(cells, 252, geometry, samples, larger, slightly_larger)
+    for pose in rng.uniform((-2.5, 4.5, -4.0), (5.5, 11.5, 4.0), (60, 3)):
+        costs = [pose_cost(cells, 252, geometry, one, pose) for one in (samples, larger, slightly_larger)]
+        missing = 2 if costs[2] < 0 else 1 if costs[1] < 0 else 0
+        assert fitting_cost(ground, pose) == (-1 if costs[0] < 0 else costs[0] + missing * CLOSE_COST)
 
 
 @settings(max_examples=50, deadline=None)
