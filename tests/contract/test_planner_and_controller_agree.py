@@ -30,6 +30,8 @@ REFUSED = (
     ("theta_star", "follow_path", 0), ("astar", "follow_path", 6), ("hybrid_astar", "follow_path", 9),
     ("hybrid_astar", "regulated_pure_pursuit", 9), ("theta_star", "follow_path", 15),
     ("straight_line", "follow_path", 20), ("theta_star", "follow_path", 20), ("astar", "follow_path", 23),
+    ("dijkstra", "regulated_pure_pursuit", 325), ("astar", "regulated_pure_pursuit", 353),
+    ("astar", "follow_path", 353),
 )  # fmt: skip
 """Drives on the costmap that were refused twice at one place."""
 AT_LIMITS = (
@@ -42,12 +44,14 @@ STOOD = (
     ("costmap", "hybrid_astar", "mppi", 302), ("costmap", "dijkstra", "mppi", 304), ("costmap", "astar", "dwa", 304),
     ("costmap", "hybrid_astar", "dwa", 304), ("costmap", "hybrid_astar", "rotation_shim", 304),
     ("costmap", "dijkstra", "dwa", 308), ("costmap", "dijkstra", "dwa", 325), ("costmap", "hybrid_astar", "mppi", 325),
-    ("costmap", "theta_star", "rotation_shim", 325), ("mesh", "dijkstra", "mppi", 65), ("mesh", "dijkstra", "mppi", 67),
+    ("costmap", "theta_star", "rotation_shim", 325), ("costmap", "theta_star", "dwa", 344),
+    ("costmap", "astar", "dwa", 353), ("costmap", "theta_star", "mppi", 353),
+    ("mesh", "dijkstra", "mppi", 65), ("mesh", "dijkstra", "mppi", 67),
 )  # fmt: skip
 """Drives with sampled motions that stood before their goal until their time was over, crept, or touched something."""
 THROUGH_GAPS = [
     *((name, width) for name in ("dwa", "mppi", "rotation_shim", "follow_path") for width in (0.55, 0.6)),
-    ("regulated_pure_pursuit", 0.6),
+    *(("regulated_pure_pursuit", width) for width in (0.55, 0.6)),
 ]
 SAMPLING = (("costmap", "dwa"), ("costmap", "mppi"), ("costmap", "rotation_shim"), ("mesh", "mppi"))
 FOLLOWERS = {"regulated_pure_pursuit", "follow_path", "path_follower"}
