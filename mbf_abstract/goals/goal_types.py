@@ -1,7 +1,7 @@
 """Goals of the actions, with the fields of ``mbf_msgs``; see ``result_types`` and ``feedback_types``.
 
 An empty plugin name means the first one loaded (for a running ``exe_path``: the running one). All values are frozen;
-a goal object can be sent any number of times.
+a goal object can be sent any number of times. What is no pose or no path where one belongs is a TypeError.
 """
 
 from __future__ import annotations
@@ -15,6 +15,17 @@ from mbf_abstract.goals.goal_area import GoalArea
 
 WaypointTask = Callable[[int, Pose], None]
 """What is done at a waypoint, called with its index and pose."""
+
+
+def _expect_pose(name: str, value: object) -> None:
+    """Raise TypeError for what is no pose; x, y and yaw alone are what people try."""
+    if not isinstance(value, Pose):
+        raise TypeError(f"{name} must be a Pose, such as Pose.planar(x, y, yaw), got {type(value).__name__}")
+
+
+def _expect_path(value: object) -> None:
+    if not isinstance(value, Path):
+        raise TypeError(f"path must be a Path, such as Path.from_poses(poses), got {type(value).__name__}")
 
 
 @dataclass(frozen=True)
@@ -45,6 +56,11 @@ class GetPathGoal:
     goal_area: GoalArea | None = None
     concurrency_slot: int = 0
 
+    def __post_init__(self) -> None:
+        _expect_pose("target_pose", self.target_pose)
+        if self.start_pose is not None:
+            _expect_pose("start_pose", self.start_pose)
+
 
 @dataclass(frozen=True)
 class ExePathGoal:
@@ -59,6 +75,9 @@ class ExePathGoal:
     angle_tolerance: float | None = None
     goal_area: GoalArea | None = None
     concurrency_slot: int = 0
+
+    def __post_init__(self) -> None:
+        _expect_path(self.path)
 
 
 @dataclass(frozen=True)
@@ -83,6 +102,9 @@ class RefinePathGoal:
     path: Path
     refiner: str = ""
     concurrency_slot: int = 0
+
+    def __post_init__(self) -> None:
+        _expect_path(self.path)
 
 
 @dataclass(frozen=True)
@@ -114,10 +136,10 @@ class MoveBaseGoal:
     via: tuple[Pose, ...] = ()
 
     def __post_init__(self) -> None:
+        _expect_pose("target_pose", self.target_pose)
         object.__setattr__(self, "via", tuple(self.via))
         for index, pose in enumerate(self.via):
-            if not isinstance(pose, Pose):
-                raise TypeError(f"via[{index}] must be a Pose, got {type(pose).__name__}")
+            _expect_pose(f"via[{index}]", pose)
 
 
 @dataclass(frozen=True)
@@ -150,6 +172,8 @@ class FollowWaypointsGoal:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "waypoints", tuple(self.waypoints))
+        for index, pose in enumerate(self.waypoints):
+            _expect_pose(f"waypoints[{index}]", pose)
         if self.loops < 1:
             raise ValueError(f"loops must be at least 1, got {self.loops}")
 

@@ -150,7 +150,7 @@ def test_a_via_pose_in_an_unknown_frame_is_a_tf_error(make_session):
 
 
 def test_what_is_no_pose_is_refused_with_its_place_in_the_list():
-    with pytest.raises(TypeError, match=r"via\[1\] must be a Pose, got tuple"):
+    with pytest.raises(TypeError, match=r"via\[1\] must be a Pose, such as .*, got tuple"):
         MoveBaseGoal(Pose.planar(1.0, 0.0), via=[Pose.planar(0.0, 0.0), (1.0, 2.0)])
 
 
