@@ -26,6 +26,7 @@ from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.failures import stands
 from mbf_abstract.maps.controllers.follow_path import FollowPath, FollowPathParameters
 from mbf_abstract.maps.controllers.standing import Standing, StandingParameters
+from mbf_abstract.maps.controllers.tight_places import HEADINGS
 from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.tracking.avoidance import MovingAround
 from mbf_abstract.plugins import ControlRequest, ControlResult
@@ -36,8 +37,6 @@ FARTHEST = 100.0
 """However far [m] from its path the robot is, that is for the controller to judge."""
 LOOK, LOOK_STEP = 1.5, 0.1
 """Time [s] over which motions along the path are compared with what moves, and between two looks."""
-HEADINGS = np.arange(16) * (math.pi / 8.0)
-"""Where the outline fits with all of these [rad], the robot can turn."""
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ CLOSE_FROM = 1.0
 """So far [m] before a tight place the robot is driven closely."""
 SPACING, ARM = 0.1, 0.2
 """Distance [m] of the poses looked at; each looks along the line between the points ``ARM`` before and behind it."""
-HEADINGS = [k * math.pi / 8.0 for k in range(16)]
+HEADINGS = np.arange(16) * (math.pi / 8.0)
 """Where the outline fits with all of these [rad], the robot can turn."""
 CLOSELY = 0.02
 """So near [m] a robot that is driven closely comes to a cusp."""
@@ -86,7 +86,7 @@ def _next_cusp(tracker: PathTracker, fits: Fits) -> float:
     for cusp in cusps:
         if tracker.progress <= cusp <= tracker.progress + REACH:
             x, y = tracker.point_at(cusp)[:2].tolist()
-            if not all(fits(x, y, yaw) for yaw in HEADINGS):
+            if not all(fits(x, y, yaw) for yaw in HEADINGS.tolist()):
                 return cusp
     return math.inf
 
