@@ -76,8 +76,8 @@ class PathTracker:
         switches = self.lengths[1:-1][self.reverse[1:] != self.reverse[:-1]]
         turns = [turn for turn in self._turns_back().tolist() if not np.any(np.abs(switches - turn) <= ARM)]
         self.cusps: FloatArray = np.unique(np.concatenate([switches, turns, self.lengths[-1:]]))
-        self.progress, self.deviation, self.cusp_reached = 0.0, 0.0, CUSP_REACHED
-        self._joined, self._segment = False, 0
+        self.deviation, self.cusp_reached, self._joined = 0.0, CUSP_REACHED, False
+        self._advance(0.0)
 
     @property
     def goal(self) -> Pose:
@@ -139,6 +139,13 @@ class PathTracker:
             self._advance(cusp)
         self.deviation = _norm(c - r for c, r in zip(self._point_at(self.progress), place, strict=True))
 
+    def begin_next_section(self) -> bool:
+        """Take the next cusp for reached, unless it is the end or farther than ``CUSP_REACHED``; whether it is so."""
+        is_near = not self.on_last_section and self.to_cusp <= CUSP_REACHED
+        if is_near:
+            self._advance(self.next_cusp)
+        return is_near
+
     def seen_from(self, transform: Transform) -> PathTracker:
         """Return the same path and progress in the transform's parent frame."""
         moved = copy(self)
@@ -178,7 +185,10 @@ class PathTracker:
 
     def ahead(self, distance: float) -> FloatArray:
         """Points (m, dimensions) of the path from the progress on, over ``distance`` [m]; at least two."""
-        return self._stretch(min(self.progress + distance, self.length))
+        end = min(self.progress + distance, self.length)
+        last = int(np.searchsorted(self.lengths, end - _POSITION_NOISE, side="left"))
+        first_point, last_point = self.points_at(np.array([self.progress, end]))
+        return np.vstack([first_point, self.points[self._segment + 1 : last], last_point])
 
     def _advance(self, progress: float) -> None:
         self.progress = progress
@@ -189,8 +199,7 @@ class PathTracker:
 
         A plain loop: the path leads away from a robot that is on it within a few segments.
         """
-        best, least = self.progress, math.inf
-        factor, margin = LEADS_AWAY
+        best, least, (factor, margin) = self.progress, math.inf, LEADS_AWAY
         for begin, length, corner, following in self._segments_from(self._segment):
             if begin >= end and least < math.inf:
                 break
@@ -213,21 +222,13 @@ class PathTracker:
             for k in range(len(ends) - 1):
                 yield begins[k], begins[k + 1] - begins[k], ends[k], ends[k + 1]
 
-    def _stretch(self, end: float) -> FloatArray:
-        """Points of the path from the progress to ``end`` [m] along it."""
-        first = int(np.searchsorted(self.lengths, self.progress + _POSITION_NOISE, side="right"))
-        last = int(np.searchsorted(self.lengths, end - _POSITION_NOISE, side="left"))
-        ends = self.points_at(np.array([self.progress, end]))
-        return np.concatenate([ends[:1], self.points[first : max(last, first)], ends[1:]])
-
     def _joining_place(self, robot: FloatArray) -> float:
         """Length along the path [m] from which on a robot that comes to it looks for its place."""
         if len(self.points) < 2:
             return 0.0
         sides, offsets = np.diff(self.points, axis=0), robot - self.points[:-1]
-        shares = np.clip(
-            scalar_products(offsets, sides) / np.maximum(scalar_products(sides, sides), _POSITION_NOISE), 0.0, 1.0
-        )
+        along, squares = scalar_products(offsets, sides), scalar_products(sides, sides)
+        shares = np.clip(along / np.maximum(squares, _POSITION_NOISE), 0.0, 1.0)
         gaps = norm(offsets - shares[:, None] * sides)
         return float(self.lengths[int(np.argmax(gaps <= gaps.min() + SAME_PLACE))])
 
@@ -236,8 +237,7 @@ class PathTracker:
         inner = self.lengths[(self.lengths >= ARM) & (self.lengths <= self.length - ARM)]
         if not len(inner):
             return inner
-        before, behind = self.points_at(inner - ARM), self.points_at(inner + ARM)
-        gained = norm(behind - before)
+        gained = norm(self.points_at(inner + ARM) - self.points_at(inner - ARM))
         turning, gained = inner[gained < GAINED], gained[gained < GAINED]
         turns = np.split(np.arange(len(turning)), np.flatnonzero(np.diff(turning) > ARM) + 1)
         return turning[np.array([turn[np.argmin(gained[turn])] for turn in turns if len(turn)], dtype=np.intp)]

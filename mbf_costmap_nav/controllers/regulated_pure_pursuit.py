@@ -74,7 +74,11 @@ class RegulatedPurePursuitController(RegulatedFollower):
         cycle = self.begin_cycle(request)
         if isinstance(cycle, ControlResult):
             return cycle
-        return self._checked(cycle, self._motions(cycle))
+        result = self._checked(cycle, self._motions(cycle))
+        blocked = result.outcome == ExePathOutcome.BLOCKED_PATH
+        if blocked and self.tracker and self._tight_places.begin_next_stroke(self.tracker):
+            return self.compute_velocity_commands(request)
+        return result
 
     def _motions(self, cycle: ControlCycle) -> list[Twist]:
         """The motion that is wanted, then those that make room for it."""

@@ -31,7 +31,8 @@ REFUSED = (
     ("hybrid_astar", "regulated_pure_pursuit", 9), ("theta_star", "follow_path", 15),
     ("straight_line", "follow_path", 20), ("theta_star", "follow_path", 20), ("astar", "follow_path", 23),
     ("dijkstra", "regulated_pure_pursuit", 325), ("astar", "regulated_pure_pursuit", 353),
-    ("astar", "follow_path", 353),
+    ("astar", "follow_path", 353), ("hybrid_astar", "follow_path", 387),
+    ("hybrid_astar", "regulated_pure_pursuit", 387),
 )  # fmt: skip
 """Drives on the costmap that were refused twice at one place."""
 AT_LIMITS = (

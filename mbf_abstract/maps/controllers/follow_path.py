@@ -136,14 +136,15 @@ class FollowPath(MapPlugin, AbstractController):
             )
         except TransformError as error:
             return ControlResult(ExePathOutcome.TF_ERROR, str(error))
+        if obstacle and self._tight_places.begin_next_stroke(tracker):
+            return self.compute_velocity_commands(request)
         if obstacle:
             return blocked_path(self.navigation_map, there, obstacle)
         return ControlResult(ExePathOutcome.SUCCESS, "", command)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the path has been driven to its end, and the pose is within both tolerances of it."""
-        tracker = self._tracker
-        if tracker is None:
+        if not (tracker := self._tracker):
             return False
         self._dist_tolerance = dist_tolerance
         self._turn_at_goal.take_tolerances(dist_tolerance, angle_tolerance)

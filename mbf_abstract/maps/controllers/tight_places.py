@@ -67,6 +67,15 @@ class TightPlaces:
             self._next = min(gap, _next_cusp(tracker, fits))
         return max(self._next - tracker.progress, 0.0)
 
+    @staticmethod
+    def begin_next_stroke(tracker: PathTracker) -> bool:
+        """Where the way is blocked, go on to the next stroke of a manoeuvre; whether the robot is near enough to it.
+
+        A stroke that is driven closely may end a few millimetres before a wall, too near for a robot that is a little
+        beside its path. The last centimetres of the stroke are not needed.
+        """
+        return tracker.cusp_reached == CLOSELY and tracker.begin_next_section()
+
 
 def _poses_at(tracker: PathTracker, lengths: FloatArray, reverses: bool) -> FloatArray:
     """Poses (n, 3: x, y [m], yaw [rad]) at lengths (n,) [m] along a path, each with the heading of its stroke."""

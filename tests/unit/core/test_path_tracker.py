@@ -138,6 +138,18 @@ def test_a_robot_that_is_driven_closely_comes_closer_to_a_cusp_before_it_goes_on
         assert tracker.driving_backward is is_there
 
 
+def test_a_cusp_that_is_near_may_be_taken_for_reached_and_the_end_may_not():
+    poses = [Pose.planar(x, 0.0, 0.0) for x in (0.0, 1.0, 2.0, 1.0)]
+    tracker = PathTracker(Path.from_poses(poses), dimensions=2)
+    tracker.cusp_reached = 0.02
+    tracker.update((1.8, 0.0))
+    assert not tracker.begin_next_section() and tracker.progress == pytest.approx(1.8)
+    tracker.update((1.95, 0.0))
+    assert tracker.begin_next_section() and tracker.progress == 2.0 and tracker.driving_backward
+    tracker.update((1.05, 0.0))
+    assert not tracker.begin_next_section() and tracker.progress == pytest.approx(2.95)
+
+
 def test_past_a_cusp_and_past_the_end_a_path_is_taken_to_lead_straight_on():
     tracker = PathTracker(path_through((0, 0), (2, 0), (0, 0.02), spacing=0.05))
     tracker.update((1.7, 0.0, 0.0))
