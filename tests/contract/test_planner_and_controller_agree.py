@@ -46,7 +46,7 @@ STOOD = (
     ("costmap", "hybrid_astar", "dwa", 304), ("costmap", "hybrid_astar", "rotation_shim", 304),
     ("costmap", "dijkstra", "dwa", 308), ("costmap", "dijkstra", "dwa", 325), ("costmap", "hybrid_astar", "mppi", 325),
     ("costmap", "theta_star", "rotation_shim", 325), ("costmap", "theta_star", "dwa", 344),
-    ("costmap", "astar", "dwa", 353), ("costmap", "theta_star", "mppi", 353),
+    ("costmap", "astar", "dwa", 353), ("costmap", "theta_star", "mppi", 353), ("costmap", "theta_star", "dwa", 415),
     ("mesh", "dijkstra", "mppi", 65), ("mesh", "dijkstra", "mppi", 67),
 )  # fmt: skip
 """Drives with sampled motions that stood before their goal until their time was over, crept, or touched something."""

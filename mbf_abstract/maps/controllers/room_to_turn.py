@@ -2,13 +2,13 @@
 
 When to use: in controllers that look ahead with the robot's whole outline. A long robot beside a wall can drive, but
 not turn; it has to drive on until its corners pass. When not: round robots, which can always turn, and turning to what
-lies behind: the planner's manoeuvres or the map's recoveries (``back_up``, ``move_away``) make room for that. What
+lies ``BEHIND``: the planner's manoeuvres or the map's recoveries (``back_up``, ``move_away``) make room for that. What
 stands on the path itself blocks all of it.
 
 Rule: where the wanted motion is blocked but the outline fits on the path ahead, the robot creeps close along the path,
 or turns to it on the spot. Else wider and wider curves to the same side are tried, then going straight on; instead of a
-turn on the spot to what lies ahead, creeping along such curves. In all this the robot may drive ``distance`` [m] until
-it gets ahead on its path again.
+turn on the spot to what lies ahead or abeam, creeping along such curves. In all this the robot may drive ``distance``
+[m] until it gets ahead on its path again.
 """
 
 from __future__ import annotations
@@ -37,6 +37,11 @@ SPACING, ARM = 0.05, 0.2
 """Distance [m] of the poses on a path; each looks along the line between the points ``ARM`` before and behind it."""
 WIDER = (0.5, 0.25, 0.0)
 """Shares of the wanted turn, tried in this order."""
+BEHIND = 0.75 * math.pi
+"""What lies farther off the driving direction [rad] is behind: no room is made for a turn to it.
+
+A robot that creeps past the point it wants to turn to would otherwise stand where that lies exactly abeam.
+"""
 CURVES = (2.0, 1.0, 0.5, 0.0)
 """Curvatures [1/m] tried instead of a turn on the spot, in this order."""
 
@@ -107,8 +112,8 @@ def wider_curves(wanted: Twist) -> list[Twist]:
 
 
 def curves_ahead(turn: Twist, bearing: float, backward: bool = False) -> list[Twist]:
-    """A turn on the spot to ``bearing`` [rad] of the driving direction; then creeping to that side, if it is ahead."""
-    if abs(bearing) >= 0.5 * math.pi:
+    """A turn on the spot to ``bearing`` [rad] of the driving direction; then, unless to behind, creeping."""
+    if abs(bearing) >= BEHIND:
         return [turn]
     speed = -CREEPING if backward else CREEPING
     return [turn, *(Twist.planar(speed, wz=math.copysign(CREEPING * curve, turn.wz)) for curve in CURVES)]

@@ -59,10 +59,15 @@ def test_without_a_distance_no_room_is_made():
 
 @pytest.mark.parametrize(
     ("bearing", "backward", "last"),
-    [(1.0, False, Twist.planar(CREEPING)), (-1.0, True, Twist.planar(-CREEPING)), (2.0, False, None)],
-    ids=["ahead", "ahead of a robot that drives backward", "behind"],
+    [
+        (1.0, False, Twist.planar(CREEPING)),
+        (-1.0, True, Twist.planar(-CREEPING)),
+        (1.6, False, Twist.planar(CREEPING)),
+        (2.4, False, None),
+    ],
+    ids=["ahead", "ahead of a robot that drives backward", "abeam", "behind"],
 )
-def test_room_for_a_turn_on_the_spot_is_made_towards_what_lies_ahead_only(bearing, backward, last):
+def test_room_for_a_turn_on_the_spot_is_made_to_all_but_what_lies_behind(bearing, backward, last):
     turn = Twist.planar(wz=0.8)
     first, *others = curves_ahead(turn, bearing, backward)
     assert first == turn
