@@ -229,9 +229,17 @@ class AbstractController(Plugin):
         """Whether it needs a robot that can turn on the spot; a server whose robot cannot reports it."""
         return False
 
+    refusal: str = ""
+    """Why ``set_plan`` has refused the last path, see ``refuse``; empty = not said."""
+
     @abstractmethod
     def set_plan(self, path: Path) -> bool:
         """Take over a path in the global frame; False = refused (INVALID_PATH). Also called while driving."""
+
+    def refuse(self, reason: str) -> bool:
+        """Return False, and let the goal's message say why: ``return self.refuse("the path is in reverse")``."""
+        self.refusal = reason
+        return False
 
     @abstractmethod
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:

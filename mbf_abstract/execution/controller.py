@@ -155,8 +155,10 @@ class ControllerExecution:
             return None
         if len(plan.path) == 0:
             return self._end(ControllerState.EMPTY_PLAN, ExePathOutcome.INVALID_PATH, "the path has no poses")
-        if not self._run.call("set_plan", partial(self._controller.set_plan, plan.path)):
-            text = f"controller {self._run.plugin.name!r} refused the path"
+        self._controller.refusal = ""
+        if not (accepted := self._run.call("set_plan", partial(self._controller.set_plan, plan.path))):
+            reason = self._controller.refusal or ("set_plan returned None, not True" if accepted is None else "")
+            text = f"controller {self._run.plugin.name!r} refused the path{reason and f': {reason}'}"
             return self._end(ControllerState.INVALID_PLAN, ExePathOutcome.INVALID_PATH, text)
         if self._plan is None or plan.arrival.is_elsewhere(self._plan.arrival):
             self._stops.reset()

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbf_abstract.geometry.arcs import in_robot_frame
 from mbf_abstract.geometry.arithmetic import rotated_back
@@ -29,6 +30,12 @@ def ground_distance(pose: Pose, goal: Pose, same_storey: float = SAME_STOREY) ->
     """
     x, y, z = in_robot_frame(pose, np.asarray(goal.position))
     return math.hypot(x, y) if abs(z) <= same_storey else math.hypot(x, y, z)
+
+
+def storey_gap(pose: Pose, place: NDArray[np.float64], same_storey: float = SAME_STOREY) -> float:
+    """Height [m] of a place (3,) [m] above the robot's tangent plane, negative below it; 0 on the robot's storey."""
+    z = float(in_robot_frame(pose, place)[2])
+    return z if abs(z) > same_storey else 0.0
 
 
 def at_height_of(pose: Pose, goal: Pose, same_storey: float = SAME_STOREY) -> Pose:

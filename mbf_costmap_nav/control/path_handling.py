@@ -97,8 +97,10 @@ class PathFollower(CostmapController):
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose, in a frame with a transform to the costmap's."""
-        if len(path) == 0 or not self.transforms.can_transform(self.costmap.frame_id, path.frame_id):
-            return False
+        if len(path) == 0:
+            return self.refuse("it has no poses")
+        if not self.transforms.can_transform(self.costmap.frame_id, path.frame_id):
+            return self.refuse(f"no transform leads from its frame {path.frame_id!r} to {self.costmap.frame_id!r}")
         self.tracker = PathTracker(path, dimensions=2)
         return True
 

@@ -76,12 +76,12 @@ class MPPIController(SamplingFollower):
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose in the map's frame; not one in reverse for a car that may not."""
-        if len(path) == 0 or path.frame_id != self.mesh_map.frame_id:
-            return False
+        if why := self.not_on_mesh(path):
+            return self.refuse(why)
         p, is_car = self.parameters, self.parameters.motion_model == "ackermann"
         self._reverses = is_car and bool(reverse_segments(path, path.positions).any())
         if self._reverses and p.min_vel_x == 0.0:
-            return False
+            return self.refuse("it is driven in reverse in part, which min_vel_x: 0 forbids")
         self._approach = GoalApproach(path[-1], p.goal_distance)
         self._strict_below = 0.0
         if is_car and not self._reverses:

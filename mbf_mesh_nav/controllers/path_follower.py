@@ -82,8 +82,8 @@ class PathFollower(SurfaceFollower):
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose in the map's frame."""
-        if len(path) == 0 or path.frame_id != self.mesh_map.frame_id:
-            return False
+        if why := self.not_on_mesh(path):
+            return self.refuse(why)
         self._tracker = tracker_on_surface(self.mesh_map, path, self.parameters.max_surface_distance)
         self._approach = GoalApproach(path[-1], self.parameters.goal_distance)
         return True

@@ -31,6 +31,8 @@ from mbf_mesh_nav.motion.vector_field import VectorField
 STRAYING = 2.0
 """The field leads to the goal from anywhere, not back to the path: a robot off the path comes to its end otherwise."""
 
+NO_FIELD = "it brings no vector field along; plans of mesh.cvp do, as long as nothing refines or copies them"
+
 
 class VectorFieldParameters(PluginParameters):
     """Parameters of ``mesh.vector_field``."""
@@ -78,10 +80,12 @@ class VectorFieldController(SurfaceFollower):
     def set_plan(self, path: Path) -> bool:
         """Take over a path that brings its vector fields along; refuse others, and those of another mesh or frame."""
         fields = path.guidance if isinstance(path.guidance, tuple) else ()
-        if len(path) == 0 or path.frame_id != self.mesh_map.frame_id or not fields:
-            return False
-        if not all(isinstance(one, VectorField) and one.topology is self.mesh_map.topology for one in fields):
-            return False
+        if why := self.not_on_mesh(path):
+            return self.refuse(why)
+        if not fields or not all(isinstance(one, VectorField) for one in fields):
+            return self.refuse(NO_FIELD)
+        if not all(one.topology is self.mesh_map.topology for one in fields):
+            return self.refuse("its vector field belongs to another mesh, plan again")
         self._fields: tuple[VectorField, ...] = fields
         self._tracker = tracker_on_surface(self.mesh_map, self._last_leg(path), self.parameters.max_surface_distance)
         self._approach = GoalApproach(path[-1], self.parameters.goal_distance, STRAYING)

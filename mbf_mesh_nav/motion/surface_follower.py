@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.maps.controllers.failures import no_path, obstacle_text, outside_map
 from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath
 from mbf_abstract.plugins import ControlResult
@@ -25,6 +25,13 @@ class SurfaceFollower(MeshController):
 
     _tracker: PathTracker
     _approach: GoalApproach | None = None
+
+    def not_on_mesh(self, path: Path) -> str:
+        """Why a path cannot be followed on the map, whatever leads along it; empty if it can."""
+        if len(path) == 0:
+            return "it has no poses"
+        known = self.mesh_map.frame_id
+        return "" if path.frame_id == known else f"it is in the frame {path.frame_id!r}, the map in {known!r}"
 
     def begin_cycle(
         self, pose: Pose, max_distance: float, hint_face: int = -1

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.tangent_plane import storey_gap
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.queries import PADDED, CellState
 from mbf_abstract.outcomes import ExePathOutcome
@@ -48,11 +53,23 @@ def collision(reason: str) -> ControlResult:
     return ControlResult(ExePathOutcome.COLLISION, f"the robot touches an obstacle where it stands, and {reason}")
 
 
-def missed_path(tracker: PathTracker, allowed: float) -> ControlResult | None:
-    """Failure of a controller whose robot is farther than ``allowed`` [m] from its path; None if it is not."""
-    if tracker.deviation <= allowed:
+def storeys_off(pose: Pose, tracker: PathTracker, navigation_map: NavigationMap) -> float:
+    """How far [m] a path, tracked as seen from above, is above the robot where it has got to; 0 on its storey."""
+    if navigation_map.same_storey == math.inf:
+        return 0.0
+    place = [np.interp(tracker.progress, tracker.lengths, column) for column in tracker.path.positions.T]
+    return storey_gap(pose, np.array(place), navigation_map.same_storey)
+
+
+def missed_path(tracker: PathTracker, allowed: float, above: float = 0.0) -> ControlResult | None:
+    """Failure of a controller whose robot is farther than ``allowed`` [m] from its path; None if it is not.
+
+    ``above`` [m] is how far the path is above the robot, in addition to what the tracker knows.
+    """
+    deviation = math.hypot(tracker.deviation, above)
+    if deviation <= allowed:
         return None
-    message = f"the robot is {tracker.deviation:.2f} m from the path, allowed are {allowed:g} m"
+    message = f"the robot is {deviation:.2f} m from the path, allowed are {allowed:g} m"
     return ControlResult(ExePathOutcome.MISSED_PATH, message)
 
 

@@ -14,10 +14,10 @@ from typing import ClassVar
 import numpy as np
 
 from mbf_abstract.execution.path_tracker import CUSP_REACHED, PathTracker
-from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
+from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.maps.controllers.failures import blocked_path, missed_path, no_path, outside_map
+from mbf_abstract.maps.controllers.failures import blocked_path, missed_path, no_path, outside_map, storeys_off
 from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
@@ -29,7 +29,7 @@ from mbf_abstract.maps.controllers.room_to_turn import (
     wider_curves,
 )
 from mbf_abstract.maps.controllers.tight_places import CLOSE_FROM, CLOSELY, TightPlaces, outline_fits
-from mbf_abstract.maps.controllers.turn_at_goal import TurnAtGoal
+from mbf_abstract.maps.controllers.turn_at_goal import TurnAtGoal, from_goal
 from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.queries import AS_CONFIGURED, PADDED, CellState
 from mbf_abstract.outcomes import ExePathOutcome
@@ -112,7 +112,9 @@ class FollowPath(MapPlugin, AbstractController):
         tracker.update((pose.x, pose.y))
         self._update_end(pose, tracker)
         factor = self.relaxation.slack(self.clock.now()).controller_factor
-        if missed := missed_path(tracker, p.max_path_distance * factor):
+        if missed := missed_path(
+            tracker, p.max_path_distance * factor, storeys_off(pose, tracker, self.navigation_map)
+        ):
             return missed
 
         def blocked(motion: Twist) -> str:
@@ -243,8 +245,6 @@ class FollowPath(MapPlugin, AbstractController):
         limit = self.parameters.max_vel_theta
         return Twist.planar(wz=max(-limit, min(self.parameters.turn_gain * angle, limit)))
 
-    @staticmethod
-    def _from_goal(pose: Pose, tracker: PathTracker) -> tuple[float, float]:
-        """Distance [m] and angle [rad] from the pose to the last one of the path, seen from above."""
-        goal = tracker.goal
-        return math.hypot(goal.x - pose.x, goal.y - pose.y), normalize_angle(goal.yaw - pose.yaw)
+    def _from_goal(self, pose: Pose, tracker: PathTracker) -> tuple[float, float]:
+        """Distance [m] and angle [rad] from the pose to the last one of the path."""
+        return from_goal(pose, tracker.goal, self.navigation_map.same_storey)

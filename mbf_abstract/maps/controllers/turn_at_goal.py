@@ -7,6 +7,13 @@ heading, but stands out of the tolerance, it drives again: only turning it would
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
+from mbf_abstract.geometry import Pose, normalize_angle
+from mbf_abstract.geometry.tangent_plane import storey_gap
+
 DRIFT = 2.0
 """So many times as far as before from its goal a robot may be while it turns."""
 PATIENCE = 10
@@ -40,3 +47,11 @@ class TurnAtGoal:
         self._cycles = self._cycles + 1 if is_near and abs(turn) <= self._angle_tolerance else 0
         self.is_turning = is_near and self._cycles <= PATIENCE
         return self.is_turning
+
+
+def from_goal(pose: Pose, goal: Pose, same_storey: float) -> tuple[float, float]:
+    """Distance [m] and angle [rad] from a pose to the goal, seen from above; in 3D to a goal on another storey."""
+    gap = math.hypot(goal.x - pose.x, goal.y - pose.y)
+    if same_storey < math.inf:
+        gap = math.hypot(gap, storey_gap(pose, np.asarray(goal.position), same_storey))
+    return gap, normalize_angle(goal.yaw - pose.yaw)

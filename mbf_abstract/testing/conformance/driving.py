@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from mbf_abstract.geometry import Path
 from mbf_abstract.goals.feedback_types import MoveBaseFeedback
 from mbf_abstract.goals.goal_area import DiscArea
@@ -129,6 +131,18 @@ def a_path_far_from_the_robot_is_missed(site: Site) -> None:
     result = site.navigator.exe_path(site.path((8.0, 6.0), (10.0, 6.0)))
     site.expect_outcome(result, ExePathOutcome.MISSED_PATH, "the robot is 6.32 m from the path, allowed")
     site.expect_near(START.x, START.y, 0.05, "the path is elsewhere")
+
+
+@situation(controller_max_retries=0)
+def a_path_on_another_storey_is_missed(site: Site) -> None:
+    """A path metres above the robot ends with MISSED_PATH on a map with heights; a flat map has no storeys."""
+    flat, path = site.map.same_storey == math.inf, site.path((2.0, 4.0), (5.0, 4.0))
+    result = site.navigator.exe_path(replace(path, positions=path.positions + np.array([0.0, 0.0, 4.0])))
+    if flat:
+        site.expect_outcome(result, ExePathOutcome.SUCCESS)
+    else:
+        site.expect_outcome(result, ExePathOutcome.MISSED_PATH, "the robot is 4.00 m from the path, allowed")
+        site.expect_near(START.x, START.y, 0.05, "the path is on another storey")
 
 
 @situation(controller_max_retries=0)

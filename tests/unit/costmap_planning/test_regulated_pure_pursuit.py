@@ -160,8 +160,11 @@ def test_robot_off_the_map_is_out_of_map(pursuit):
 
 def test_a_path_in_another_frame_or_without_poses_is_refused(pursuit):
     # F129: Nav2 answers that the robot is infinitely far from a path without poses.
-    assert not pursuit().set_plan(Path.from_points([(0, 0, 0)], frame_id="odom"))
-    assert not pursuit().set_plan(Path(np.zeros((0, 3))))
+    controller = pursuit()
+    assert not controller.set_plan(Path.from_points([(0, 0, 0)], frame_id="odom"))
+    assert controller.refusal == "no transform leads from its frame 'odom' to 'map'"
+    assert not controller.set_plan(Path(np.zeros((0, 3))))
+    assert controller.refusal == "it has no poses"
 
 
 def test_poses_against_the_path_are_driven_backward(pursuit):

@@ -58,6 +58,23 @@ def test_f279_a_plan_that_the_plugin_refuses(make_session, states):
     assert (result.outcome, result.message) == (Outcome.INVALID_PATH, "controller 'controller' refused the path")
 
 
+def test_a_refused_plan_says_why_where_the_plugin_does(make_session):
+    session = make_session()
+    session.controller.set_plan = lambda path: session.controller.refuse("it has 21 poses")
+    result = session.navigator.exe_path(session.path_to(2.0))
+    assert result.message == "controller 'controller' refused the path: it has 21 poses"
+    session.controller.set_plan = lambda path: False
+    assert session.navigator.exe_path(session.path_to(2.0)).message == "controller 'controller' refused the path"
+
+
+def test_a_controller_that_forgets_to_accept_its_plan_is_told_so(make_session):
+    session = make_session()
+    session.controller.set_plan = lambda path: None
+    result = session.navigator.exe_path(session.path_to(2.0))
+    assert result.outcome == Outcome.INVALID_PATH
+    assert result.message == "controller 'controller' refused the path: set_plan returned None, not True"
+
+
 def test_f280_without_a_robot_pose_it_holds_and_then_ends(make_session):
     session = make_session(controller_patience=2.0, tf_timeout=0.5)
     session.robot.publishes_pose = False

@@ -69,17 +69,23 @@ def test_at_the_goal_it_only_turns(ready):
 
 
 def test_a_path_without_a_field_is_refused(ready):
-    assert not ready().set_plan(Path.from_points([(1, 1, 0), (2, 1, 0)]))
+    controller = ready()
+    assert not controller.set_plan(Path.from_points([(1, 1, 0), (2, 1, 0)]))
+    assert controller.refusal.startswith("it brings no vector field along; plans of mesh.cvp do")
 
 
 def test_a_field_of_another_mesh_or_a_path_in_another_frame_is_refused(make_plugin, plain):
     request = PlanRequest(Pose.planar(1, 3), Pose.planar(5, 3))
     path = make_plugin(CVPPlanner, plain()).make_plan(request).path
-    assert not make_plugin(VectorFieldController, plain()).set_plan(path)
+    elsewhere = make_plugin(VectorFieldController, plain())
+    assert not elsewhere.set_plan(path)
+    assert elsewhere.refusal == "its vector field belongs to another mesh, plan again"
     mesh_map = plain()
     path = make_plugin(CVPPlanner, mesh_map).make_plan(request).path
     assert make_plugin(VectorFieldController, mesh_map).set_plan(path)
-    assert not make_plugin(VectorFieldController, mesh_map).set_plan(dataclasses.replace(path, frame_id="odom"))
+    controller = make_plugin(VectorFieldController, mesh_map)
+    assert not controller.set_plan(dataclasses.replace(path, frame_id="odom"))
+    assert controller.refusal == "it is in the frame 'odom', the map in 'map'"
 
 
 def test_off_the_surface_is_out_of_map_and_off_the_field_is_missed_path(ready):

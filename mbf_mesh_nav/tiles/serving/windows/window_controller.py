@@ -35,10 +35,10 @@ class WindowController(OnWindow[MeshController], AbstractController):
     def set_plan(self, path: Path) -> bool:
         """Take over a path, which may lead out of the window."""
         self._tracker, self._accepted = None, True
-        accepted = self._on_window().set_plan(path)
-        if accepted:
-            self._tracker = PathTracker(path)
-        return accepted
+        if not self._on_window().set_plan(path):
+            return self.refuse(self._inner.refusal)
+        self._tracker = PathTracker(path)
+        return True
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle of the controller on the present window."""
@@ -46,7 +46,8 @@ class WindowController(OnWindow[MeshController], AbstractController):
         inner = self._on_window()
         if not self._accepted:
             text = "the controller does not take what is left of the path on another window"
-            return ControlResult(ExePathOutcome.INVALID_PATH, text)
+            why = inner.refusal
+            return ControlResult(ExePathOutcome.INVALID_PATH, f"{text}: {why}" if why else text)
         return inner.compute_velocity_commands(request)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
