@@ -17,6 +17,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE
 from mbf_abstract.maps.tracking.motion_changes import MotionChanges
@@ -70,7 +71,7 @@ class ServedMap(Generic[Map]):
         self._lock = threading.Lock()
         self._users, self._running, self._idle_since = 0, False, runtime.clock.now()
         if not runtime.parameters.shutdown_costmaps:
-            self._start()
+            self._start_first()
         self._ticker = Ticker(runtime.clock, runtime.events, self._tick, 1.0 / update_frequency, name)
 
     @contextmanager
@@ -115,6 +116,15 @@ class ServedMap(Generic[Map]):
         if not self._running:
             self.update()
             self._running = True
+
+    def _start_first(self) -> None:
+        """Start, and name the layer that raises, also a ``sys.exit()``; there is no goal yet that could say so."""
+        try:
+            self._start()
+        except (Exception, SystemExit) as error:
+            if not (problem := getattr(self.map.layers, "problem", "")):
+                raise
+            raise LayerListError(f"{self.name}: {problem}") from error
 
     def _tick(self) -> None:
         parameters, now = self._runtime.parameters, self._runtime.clock.now()

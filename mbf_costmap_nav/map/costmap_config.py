@@ -22,9 +22,10 @@ from pathlib import Path
 from pydantic import field_validator, model_validator
 
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.maps.layers.layer_list import LayerBlocks, LayerEntry, layer_loader, plan_layers
+from mbf_abstract.maps.layers.layer_list import LayerBlocks, LayerEntry, layer_loader, making, plan_layers
 from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE
 from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_costmap_nav.files.map_description import MapError
 from mbf_costmap_nav.grid.costmap import MAX_CELLS, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext
@@ -144,24 +145,23 @@ def build_layered_costmap(
     """
     plan = plan_layers(parameters.layers, layer_blocks or {}, load_layer or layer_loader("costmap", CostmapLayer))
     static_maps = StaticMaps(transforms) if static_maps is None else static_maps
-    layers = [
-        planned.layer_class(
-            LayerContext(
-                name=planned.entry.name,
-                parameters=planned.parameters,
-                frame_id=parameters.frame_id,
-                rolling_window=parameters.rolling_window,
-                track_unknown_space=parameters.track_unknown_space,
-                base_folder=Path(base_folder),
-                confine_images=parameters.confine_images,
-                static_map=static_map,
-                transforms=transforms,
-                max_cells=parameters.max_cells,
-                static_maps=static_maps,
-            )
+    layers: list[CostmapLayer] = []
+    for planned in plan:
+        context = LayerContext(
+            name=planned.entry.name,
+            parameters=planned.parameters,
+            frame_id=parameters.frame_id,
+            rolling_window=parameters.rolling_window,
+            track_unknown_space=parameters.track_unknown_space,
+            base_folder=Path(base_folder),
+            confine_images=parameters.confine_images,
+            static_map=static_map,
+            transforms=transforms,
+            max_cells=parameters.max_cells,
+            static_maps=static_maps,
         )
-        for planned in plan
-    ]
+        with making(context.name, passing=(MapError,)):
+            layers.append(planned.layer_class(context))
     for layer in layers:
         static_maps.add(partial(getattr, layer, "floor_plan"))
     return LayeredCostmap(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer import LayerParameters
@@ -74,9 +75,18 @@ class LayerAnswers(SnapshotAnswers):
             return warnings
 
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
-        """Lowest speed [m/s] the layers allow at the point (x, y) [m]; ``full_speed`` where there is no limit."""
+        """Lowest speed [m/s] the layers allow at the point (x, y) [m]; ``full_speed`` where there is no limit.
+
+        Raises ValueError where a layer allows no speed that is one.
+        """
+        limit = full_speed
         with self._lock:
-            return min((layer.speed_limit(x, y, full_speed) for layer in self.layers.enabled), default=full_speed)
+            for layer in self.layers.enabled:
+                allowed: Any = layer.speed_limit(x, y, full_speed)
+                if allowed is None or not allowed >= 0.0:
+                    raise ValueError(f"layer {layer.name!r} gives a speed limit of {allowed} m/s, expected 0 or more")
+                limit = min(limit, allowed)
+        return limit
 
     # ---------------------------------------------------------------------------------- changing and clearing
     def _replace_parameters(self, name: str, parameters: LayerParameters) -> None:

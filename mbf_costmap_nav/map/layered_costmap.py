@@ -17,11 +17,12 @@ from typing import Any
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.avoided_places import AvoidedPlace
+from mbf_abstract.maps.layers.layer_list import making
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.map.cell_window import CellWindow
-from mbf_costmap_nav.map.layer import CostmapLayer
+from mbf_costmap_nav.map.layer import CostmapLayer, legal_box
 from mbf_costmap_nav.map.layer_answers import LayerAnswers
 
 
@@ -84,7 +85,8 @@ class LayeredCostmap(LayerAnswers):
         self._avoided: tuple[AvoidedPlace, ...] = ()
         self._unmoved: set[str] = set()  # names of layers whose cells are not those of the window, or of their floor
         for layer in layers:
-            layer.match_geometry(geometry)
+            with making(layer.name):
+                layer.match_geometry(geometry)
         self.set_footprint(footprint)
 
     # ------------------------------------------------------------------------------------------------ reading
@@ -177,7 +179,7 @@ class LayeredCostmap(LayerAnswers):
             self._window.recompute_all()  # stays so if a layer raises: the next update then repairs everything
             for layer in self.layers.enabled:
                 with self.layers.computing(layer):
-                    box = layer.update_bounds(robot_pose, now, box)
+                    box = legal_box(layer.update_bounds(robot_pose, now, box))
             box = box.clipped(self.geometry.box)
             if not box.empty:
                 self._recompute(box)

@@ -125,25 +125,40 @@ class MeshLayer(map_layer.MapLayer):
     def recompute(self) -> IntArray:
         """Compute everything anew and return the vertices whose cost or flag changed, ascending."""
         if self.parameters.enabled:
-            return self.replace(*self.compute())
+            values: Any = self.compute()
+            if not (isinstance(values, tuple) and len(values) == 2):
+                raise TypeError(f"compute must return costs and lethal flags, a tuple, got {type(values).__name__}")
+            return self.replace(*values)
         count = self.topology.vertex_count
         return self.replace(np.zeros(count, dtype=np.float32), np.zeros(count, dtype=np.bool_))
 
     def replace(self, costs: CostArray, lethal: LethalArray) -> IntArray:
         """Take over new values and return the vertices that changed, ascending.
 
+        Values of other types are converted: a flag is any number but 0, a cost that is NaN is missing.
+
         Raises
         ------
         ValueError
             There is not one value for each vertex.
+        TypeError
+            The values are no numbers.
         """
-        expected = (self.topology.vertex_count,)
-        for what, values in (("costs", costs), ("lethal flags", lethal)):
-            if np.shape(values) != expected:
-                raise ValueError(f"layer '{self.name}' gives {what} of shape {np.shape(values)}, expected {expected}")
+        costs, lethal = self._legal("costs", costs, np.float32), self._legal("lethal flags", lethal, np.bool_)
+        if (missing := np.isnan(costs)).any():
+            costs = np.where(missing, np.float32(np.inf), costs)
         changed = np.flatnonzero((costs != self._costs) | (lethal != self._lethal)).astype(np.int32)
         self._costs, self._lethal = costs, lethal
         return changed
+
+    def _legal(self, what: str, values: Any, dtype: type[np.generic]) -> NDArray[Any]:
+        """One number for each vertex, of this type; the array itself where it is so already."""
+        array, expected = np.asarray(values), (self.topology.vertex_count,)
+        if array.shape != expected:
+            raise ValueError(f"layer '{self.name}' gives {what} of shape {array.shape}, expected {expected}")
+        if array.dtype.kind not in "biuf":
+            raise TypeError(f"layer '{self.name}' gives {what} of type {array.dtype}, expected {np.dtype(dtype)}")
+        return array.astype(dtype, copy=False)
 
     def take_over(self, old: MeshLayer) -> None:
         """Know what a layer of the same class has sensed on another part of the same surface, before ``compute``.

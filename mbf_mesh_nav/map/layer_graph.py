@@ -12,6 +12,7 @@ are not up to date.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,8 @@ class LayerGraph(LayerStack[MeshLayer]):
             from_inputs = union_of([changed[read.name] for read in layer.inputs if read.name in changed])
             try:
                 with self.computing(layer):
-                    own = union_of([changed.get(name, NOTHING_CHANGED), self._follow(layer, from_inputs), event(layer)])
+                    followed, by_event = self._follow(layer, from_inputs), _vertices(layer, event(layer))
+                    own = union_of([changed.get(name, NOTHING_CHANGED), followed, by_event])
             except BaseException:  # also a sys.exit()
                 self._interrupted.add(name)
                 self._owed = changed
@@ -73,7 +75,7 @@ class LayerGraph(LayerStack[MeshLayer]):
             layer.recompute()
             return np.arange(len(layer.costs), dtype=np.int32)
         follows = layer.parameters.enabled and len(from_inputs)
-        return layer.update_from_inputs(from_inputs) if follows else NOTHING_CHANGED
+        return _vertices(layer, layer.update_from_inputs(from_inputs)) if follows else NOTHING_CHANGED
 
     def set_parameters(self, name: str, parameters: LayerParameters) -> dict[str, IntArray]:
         """Change a layer's parameters at run time and recompute what depends on them; returns what changed.
@@ -105,6 +107,27 @@ class LayerGraph(LayerStack[MeshLayer]):
             if len(restored):
                 self._owed[name] = union_of([self._owed.get(name, NOTHING_CHANGED), restored])
             raise
+
+
+def _vertices(layer: MeshLayer, changed: Any) -> IntArray:
+    """The vertices that a layer says it has changed, ascending without repetitions.
+
+    Raises
+    ------
+    TypeError, IndexError
+        It returned something else, or vertices that the mesh does not have.
+    """
+    vertices, count = np.asarray(changed), layer.topology.vertex_count
+    if vertices.ndim != 1 or (len(vertices) and vertices.dtype.kind not in "iu"):
+        got = f"{type(changed).__name__} of shape {vertices.shape}, type {vertices.dtype}"
+        raise TypeError(f"a layer returns the vertices (k,) int that have changed, got {got}")
+    if (vertices[1:] <= vertices[:-1]).any():
+        vertices = np.unique(vertices)
+    if len(vertices) and not (vertices[0] >= 0 and vertices[-1] < count):
+        raise IndexError(
+            f"vertices {vertices[0]} to {vertices[-1]} have changed, but the mesh has only 0 to {count - 1}"
+        )
+    return vertices.astype(np.int32, copy=False)
 
 
 def union_of(sets: Sequence[IntArray]) -> IntArray:

@@ -33,6 +33,7 @@ from mbf_abstract.maps.layers.layer_list import (
     LayerListError,
     PlannedLayer,
     layer_loader,
+    making,
     plan_layers,
 )
 from mbf_mesh_nav.files.map_header import read_map_header
@@ -46,7 +47,7 @@ from mbf_mesh_nav.map.map_findings import frame_findings, header_findings, map_f
 from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.densify import densify
-from mbf_mesh_nav.mesh.mesh_report import Finding
+from mbf_mesh_nav.mesh.mesh_report import Finding, MeshError
 from mbf_mesh_nav.mesh.repair import checked_mesh
 from mbf_mesh_nav.mesh.topology import build_topology
 
@@ -170,14 +171,15 @@ def compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer[MeshLayer]], c
         name, settings = planned.entry.name, cast(LayerParameters, planned.parameters)
         surface, errors = (mesh_map.topology, mesh_map.locator), (mesh_map.height_errors, mesh_map.place_errors)
         context = LayerContext(name, *surface, settings, inputs, mesh_map.frame_id, *errors)
-        layer = planned.layer_class(context)
-        stored = cache.load(layer) if cache and layer.cacheable else None
-        if stored is not None:
-            layer.replace(*stored)
-        else:
-            layer.recompute()
-            if cache and layer.cacheable and not complaint:
-                complaint = cache.store(layer)
+        with making(name, passing=(MeshError,)):
+            layer = planned.layer_class(context)
+            stored = cache.load(layer) if cache and layer.cacheable else None
+            if stored is not None:
+                layer.replace(*stored)
+            else:
+                layer.recompute()
+        if stored is None and cache and layer.cacheable and not complaint:
+            complaint = cache.store(layer)
         layers[name] = layer
     if complaint:
         text = f"layers cannot be kept in {cache_dir}: {complaint}; they are computed at every start"

@@ -12,7 +12,8 @@ All findings are reported at once, before a map file is read.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from typing import Any, Generic, TypeVar, cast
@@ -20,6 +21,7 @@ from typing import Any, Generic, TypeVar, cast
 from pydantic import ValidationError
 
 from mbf_abstract.config.registry import PluginError, PluginRegistry
+from mbf_abstract.event_values import error_text
 from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
 from mbf_abstract.parameters import ParameterModel, parameter
 
@@ -30,6 +32,20 @@ LayerBlocks = Mapping[str, Mapping[str, Any] | LayerParameters]
 
 class LayerListError(ValueError):
     """The layers of a map cannot be built; the text has all findings: unknown types or inputs, circles and so on."""
+
+
+@contextmanager
+def making(name: str, passing: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+    """Let what a layer raises while its map is built, also a ``sys.exit()``, end as a LayerListError with its name.
+
+    Errors that are ``passing`` stay as they are: those of files, which name them.
+    """
+    try:
+        yield
+    except (LayerListError, *passing):
+        raise
+    except (Exception, SystemExit) as error:
+        raise LayerListError(f"layer {name!r} raised {type(error).__name__}: {error_text(error)}") from error
 
 
 class LayerEntry(ParameterModel):

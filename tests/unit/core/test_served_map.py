@@ -4,6 +4,9 @@ from types import MappingProxyType
 
 import pytest
 
+from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
+from mbf_abstract.maps.layers.layer_list import LayerListError
+from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.testing.scripted_session import ScriptedSession
 
@@ -115,3 +118,16 @@ def test_switching_the_parameter_starts_or_stops_an_idle_map(serve):
     assert is_updated(served, session)
     session.clock.sleep(0.6)
     assert not is_updated(served, session)
+
+
+def test_a_layer_that_raises_in_the_first_update_is_named(serve):
+    class BadMap(CountedMap):
+        layers = LayerStack()
+
+        def update(self, robot_pose, now):
+            with self.layers.computing(MapLayer("mine", LayerParameters())):
+                raise SystemExit(3)
+
+    _, session = serve()
+    with pytest.raises(LayerListError, match="map: layer 'mine' raised SystemExit: 3"):
+        ServedMap(BadMap(), session.server.runtime, "map", None, 10.0)
