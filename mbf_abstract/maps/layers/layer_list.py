@@ -40,9 +40,10 @@ def making(name: str, passing: tuple[type[Exception], ...] = ()) -> Iterator[Non
 
     Errors that are ``passing`` stay as they are: those of files, which name them.
     """
+    known: tuple[type[Exception], ...] = (LayerListError, *passing)
     try:
         yield
-    except (LayerListError, *passing):
+    except known:
         raise
     except (Exception, SystemExit) as error:
         raise LayerListError(f"layer {name!r} raised {type(error).__name__}: {error_text(error)}") from error

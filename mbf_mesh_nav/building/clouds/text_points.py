@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from codecs import BOM_UTF8
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
@@ -39,13 +40,15 @@ def read_text_points(path: Path, max_points: int) -> StoredPoints:
         A row without three numbers, more than ``max_points`` rows, or a header that names no x, y and z.
     """
     with path.open("rb") as file:
+        begin = len(BOM_UTF8) if file.read(len(BOM_UTF8)) == BOM_UTF8 else 0  # spreadsheets write it
+        file.seek(begin)
         skipped, columns, delimiter = _layout(path, file)
-        file.seek(0)
+        file.seek(begin)
         lines = 0
         while chunk := file.read(CHUNK_BYTES):
             lines += chunk.count(b"\n")
             refuse_count(path, lines - skipped, max_points)
-        file.seek(0)
+        file.seek(begin)
         for _ in range(skipped):
             file.readline()
         return StoredPoints(read_rows(path, file, columns, delimiter))

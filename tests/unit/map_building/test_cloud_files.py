@@ -78,6 +78,14 @@ def test_columns_are_found_by_their_names(tmp_path):
     np.testing.assert_array_equal(read_clouds([file]).points, POINTS)
 
 
+@pytest.mark.parametrize("head", ["X,Y,Z\r\n", ""])
+def test_the_byte_order_mark_of_a_spreadsheet_is_no_part_of_the_table(tmp_path, head):
+    file = tmp_path / "survey.csv"
+    rows = "".join(f"{x},{y},{z}\r\n" for x, y, z in POINTS.tolist())
+    file.write_bytes(("\ufeff" + head + rows).encode())
+    np.testing.assert_array_equal(read_clouds([file]).points, POINTS)
+
+
 def test_the_up_axis_and_the_unit_are_applied(tmp_path):
     x, y, z = (1000.0 * POINTS).T
     file = write_text(tmp_path / "millimetres.xyz", np.column_stack([x, z, -y]))
