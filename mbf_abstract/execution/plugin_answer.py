@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import numbers
 from typing import TypeVar
 
+from mbf_abstract.geometry import Path
 from mbf_abstract.plugins import PluginResult
 
 MAX_OUTCOME = 2**32 - 1  # outcomes are unsigned integers of 32 bits in ``mbf_msgs``
@@ -33,6 +35,19 @@ def checked_answer(answer: object, expected: type[A], plugin: str, method: str) 
         problem = f"an outcome outside of 0..{MAX_OUTCOME}"  # may have too many digits to be printed
     elif not isinstance(message, str):
         problem = f"a message of type {type(message).__name__}, not str"
+    else:
+        problem = _wrong_plan(answer)
     if problem:
         raise PluginFault(f"plugin {plugin!r} returned {problem}, from {method}")
     return answer
+
+
+def _wrong_plan(answer: PluginResult) -> str:
+    """What is wrong with the path and the cost of an answer that has them; empty if nothing is."""
+    path: object = getattr(answer, "path", None)
+    cost: object = getattr(answer, "cost", 0.0)
+    if path is not None and not isinstance(path, Path):
+        return f"a path of type {type(path).__name__}, not Path"
+    if isinstance(cost, bool) or not isinstance(cost, numbers.Real):
+        return f"a cost of type {type(cost).__name__}, not a number"
+    return "a cost of nan, which is no number" if math.isnan(cost) else ""

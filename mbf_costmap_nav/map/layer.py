@@ -182,13 +182,6 @@ class CostmapLayer(MapLayer):
         return full_speed
 
 
-def legal_box(box: object) -> CellBox:
-    """What ``update_bounds`` of a layer has returned; raises TypeError if it is no box of cells."""
-    if not isinstance(box, CellBox):
-        raise TypeError(f"update_bounds must return a box of cells, got {type(box).__name__}")
-    return box
-
-
 class GridLayer(CostmapLayer):
     """A layer that keeps its own cells and combines them into the costmap."""
 

@@ -15,6 +15,13 @@ from mbf_costmap_nav.map.layer import CostmapLayer
 from mbf_costmap_nav.map.snapshot_answers import SnapshotAnswers
 
 
+def legal_box(box: object) -> CellBox:
+    """What ``update_bounds`` of a layer has returned; raises TypeError if it is no box of cells."""
+    if not isinstance(box, CellBox):
+        raise TypeError(f"update_bounds must return a box of cells, got {type(box).__name__}")
+    return box
+
+
 class LayerAnswers(SnapshotAnswers):
     """The part of a ``LayeredCostmap`` that needs no more than its layers and the grid of its cells.
 

@@ -8,8 +8,8 @@ from mbf_abstract.event_sinks import JsonLinesSink, read_events
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal
-from mbf_abstract.outcomes import GetPathOutcome, is_success
-from mbf_abstract.plugins import PlanResult
+from mbf_abstract.outcomes import GetPathOutcome, RefinePathOutcome, is_success
+from mbf_abstract.plugins import PlanResult, RefineResult
 from mbf_abstract.testing import faulty
 from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
@@ -18,6 +18,14 @@ from tests.promises import assert_ended_once, assert_next_goals_work
 
 def outcome(code, message="found"):
     return lambda request: replace(straight_plan(request), outcome=code, message=message)
+
+
+def path_as(kind):
+    return lambda request: replace(plan := straight_plan(request), path=kind(plan.path))
+
+
+def cost(value):
+    return lambda request: replace(straight_plan(request), cost=value)
 
 
 @pytest.mark.parametrize(
@@ -36,6 +44,13 @@ def outcome(code, message="found"):
         (outcome(False), GetPathOutcome.INTERNAL_ERROR, "an outcome of type bool, not an integer"),
         (outcome("0"), GetPathOutcome.INTERNAL_ERROR, "an outcome of type str, not an integer"),
         (outcome(0, None), GetPathOutcome.INTERNAL_ERROR, "a message of type NoneType, not str"),
+        (
+            path_as(list),
+            GetPathOutcome.INTERNAL_ERROR,
+            "'planner' returned a path of type list, not Path, from make_plan",
+        ),
+        (cost("cheap"), GetPathOutcome.INTERNAL_ERROR, "'planner' returned a cost of type str, not a number"),
+        (cost(float("nan")), GetPathOutcome.INTERNAL_ERROR, "'planner' returned a cost of nan, which is no number"),
     ],
 )
 def test_a_lie_becomes_a_failure_that_names_it(lie, outcome, text):
@@ -67,3 +82,11 @@ def test_no_outcome_and_no_message_ends_the_record_of_the_run(tmp_path):
         ends = [event for event in read_events(tmp_path / "events.jsonl") if event.kind is EventKind.GOAL_FINISHED]
         assert [event.data["outcome"] for event in ends] == [62, 0, 62, 0]
         assert (tmp_path / "events.jsonl").stat().st_size < 100_000
+
+
+def test_a_refiner_that_gives_a_list_of_poses_is_named():
+    with ScriptedSession() as session:
+        session.refiner.play(lambda path: RefineResult(0, "refined", list(path)))
+        result = session.navigator.refine_path(session.path_to(3.0))
+        assert result.outcome == RefinePathOutcome.INTERNAL_ERROR
+        assert "'refiner' returned a path of type list, not Path, from apply_refinement" in result.message

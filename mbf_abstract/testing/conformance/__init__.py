@@ -27,6 +27,7 @@ from mbf_abstract.testing.conformance import (
     refining,
     sensing,
     touching,
+    unreachable_paths,
 )
 from mbf_abstract.testing.conformance.rig import BackendRig, MakeServer
 from mbf_abstract.testing.conformance.site import Situation
@@ -37,6 +38,7 @@ __all__ = ["SITUATIONS", "BackendRig", "ContractBroken", "MakeServer", "Situatio
 _PARTS: tuple[ModuleType, ...] = (
     planning,
     driving,
+    unreachable_paths,
     touching,
     canceling,
     sensing,

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-
 from mbf_abstract.geometry import Path
 from mbf_abstract.goals.feedback_types import MoveBaseFeedback
 from mbf_abstract.goals.goal_area import DiscArea
@@ -99,14 +97,6 @@ def a_wide_tolerance_ends_the_drive_early(site: Site) -> None:
 
 
 @situation()
-def a_path_in_an_unknown_frame_is_a_tf_error(site: Site) -> None:
-    """A path in an unknown frame, or a pose to go to, ends with TF_ERROR and the name of the frame."""
-    path = replace(site.path((2.0, 4.0), (5.0, 4.0)), frame_id="nowhere")
-    site.expect_outcome(site.navigator.exe_path(path), ExePathOutcome.TF_ERROR, "nowhere")
-    site.expect_outcome(site.navigator.go_to(somewhere(5.0, 4.0, "nowhere")), MoveBaseOutcome.TF_ERROR, "nowhere")
-
-
-@situation()
 def a_path_in_another_frame_is_driven(site: Site) -> None:
     """A path in another known frame is driven, and its result is in the frame of the map."""
     result = site.navigator.exe_path(T_map_dock.inverse().apply_to_path(site.path((2.0, 4.0), (4.0, 4.0))))
@@ -123,26 +113,6 @@ def a_path_without_poses_is_invalid(site: Site) -> None:
     single = Path.from_poses([somewhere(2.8, 4.0)])
     site.expect_outcome(site.navigator.exe_path(single), ExePathOutcome.SUCCESS)
     site.expect_near(2.8, 4.0, 0.25, "arrived")
-
-
-@situation(controller_max_retries=0)
-def a_path_far_from_the_robot_is_missed(site: Site) -> None:
-    """A path that begins metres away from the robot ends with MISSED_PATH, and the robot does not move."""
-    result = site.navigator.exe_path(site.path((8.0, 6.0), (10.0, 6.0)))
-    site.expect_outcome(result, ExePathOutcome.MISSED_PATH, "the robot is 6.32 m from the path, allowed")
-    site.expect_near(START.x, START.y, 0.05, "the path is elsewhere")
-
-
-@situation(controller_max_retries=0)
-def a_path_on_another_storey_is_missed(site: Site) -> None:
-    """A path metres above the robot ends with MISSED_PATH on a map with heights; a flat map has no storeys."""
-    flat, path = site.map.same_storey == math.inf, site.path((2.0, 4.0), (5.0, 4.0))
-    result = site.navigator.exe_path(replace(path, positions=path.positions + np.array([0.0, 0.0, 4.0])))
-    if flat:
-        site.expect_outcome(result, ExePathOutcome.SUCCESS)
-    else:
-        site.expect_outcome(result, ExePathOutcome.MISSED_PATH, "the robot is 4.00 m from the path, allowed")
-        site.expect_near(START.x, START.y, 0.05, "the path is on another storey")
 
 
 @situation(controller_max_retries=0)
