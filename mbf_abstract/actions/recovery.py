@@ -11,7 +11,7 @@ from typing import Any
 
 from mbf_abstract.actions.action import GoalJob
 from mbf_abstract.actions.plugin_action import PluginAction
-from mbf_abstract.event_values import error_text
+from mbf_abstract.config.findings import text_of
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.recovery import RecoveryExecution
 from mbf_abstract.goals.feedback_types import NoFeedback
@@ -52,7 +52,8 @@ class RecoveryAction(PluginAction[RecoveryGoal, RecoveryResultMessage, NoFeedbac
         try:
             with_changes(plugin.instance.parameters, goal.parameters)
         except ValueError as error:
-            return RecoveryOutcome.FAILURE, f"parameters of recovery {plugin.name!r}: {error_text(error)}"
+            wrong = "; ".join(text_of(error).splitlines())
+            return RecoveryOutcome.FAILURE, f"parameters of recovery {plugin.name!r}: {wrong}"
         return None
 
     def execute(self, job: Job) -> RecoveryResultMessage:

@@ -1,7 +1,7 @@
 """Goals of the actions, with the fields of ``mbf_msgs``; see ``result_types`` and ``feedback_types``.
 
 An empty plugin name means the first one loaded (for a running ``exe_path``: the running one). All values are frozen;
-a goal object can be sent any number of times. What is no pose or no path where one belongs is a TypeError.
+a goal object can be sent any number of times. A field of the wrong type is a TypeError that names it.
 """
 
 from __future__ import annotations
@@ -12,20 +12,10 @@ from typing import Any
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_area import GoalArea
+from mbf_abstract.goals.goal_fields import check_fields
 
 WaypointTask = Callable[[int, Pose], None]
 """What is done at a waypoint, called with its index and pose."""
-
-
-def _expect_pose(name: str, value: object) -> None:
-    """Raise TypeError for what is no pose; x, y and yaw alone are what people try."""
-    if not isinstance(value, Pose):
-        raise TypeError(f"{name} must be a Pose, such as Pose.planar(x, y, yaw), got {type(value).__name__}")
-
-
-def _expect_path(value: object) -> None:
-    if not isinstance(value, Path):
-        raise TypeError(f"path must be a Path, such as Path.from_poses(poses), got {type(value).__name__}")
 
 
 @dataclass(frozen=True)
@@ -57,9 +47,7 @@ class GetPathGoal:
     concurrency_slot: int = 0
 
     def __post_init__(self) -> None:
-        _expect_pose("target_pose", self.target_pose)
-        if self.start_pose is not None:
-            _expect_pose("start_pose", self.start_pose)
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -77,7 +65,7 @@ class ExePathGoal:
     concurrency_slot: int = 0
 
     def __post_init__(self) -> None:
-        _expect_path(self.path)
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -94,6 +82,9 @@ class RecoveryGoal:
     concurrency_slot: int = 0
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
 
 @dataclass(frozen=True)
 class RefinePathGoal:
@@ -104,7 +95,7 @@ class RefinePathGoal:
     concurrency_slot: int = 0
 
     def __post_init__(self) -> None:
-        _expect_path(self.path)
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -136,10 +127,7 @@ class MoveBaseGoal:
     via: tuple[Pose, ...] = ()
 
     def __post_init__(self) -> None:
-        _expect_pose("target_pose", self.target_pose)
-        object.__setattr__(self, "via", tuple(self.via))
-        for index, pose in enumerate(self.via):
-            _expect_pose(f"via[{index}]", pose)
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -171,9 +159,7 @@ class FollowWaypointsGoal:
     angle_tolerance: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "waypoints", tuple(self.waypoints))
-        for index, pose in enumerate(self.waypoints):
-            _expect_pose(f"waypoints[{index}]", pose)
+        check_fields(self)
         if self.loops < 1:
             raise ValueError(f"loops must be at least 1, got {self.loops}")
 

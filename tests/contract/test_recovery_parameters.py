@@ -42,7 +42,7 @@ def test_the_usual_parameters_come_back_after_a_failure_too(made):
     [
         ({"angle": 100.0}, "less than or equal to 31.5"),
         ({"angel": 1.0}, "angel: expected a known parameter, did you mean 'angle'?"),
-        ({"angle": math.nan}, "finite number"),
+        ({"angle": math.nan}, "'rotate': angle: input should be a finite number, got nan"),
     ],
 )
 def test_parameters_that_are_not_legal_are_refused_before_anything_moves(made, parameters, text):
