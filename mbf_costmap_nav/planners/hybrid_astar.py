@@ -168,6 +168,8 @@ def _misfit(world: CarWorld, name: str, pose: Pose, tolerance: float = 0.0) -> P
         return problem
     outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
     text = f"the robot does not fit at the {name} ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad)"
+    if world.leaves_map(pose):
+        return PlanResult(outcome, f"{text}: part of its outline would be off the map")
     return PlanResult(outcome, f"{text}, centre cost {world.costmap.cost_at(pose.x, pose.y)}")
 
 

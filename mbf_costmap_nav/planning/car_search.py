@@ -139,6 +139,12 @@ class CarWorld:
         cost = pose_cost(self.costmap.cells, self.unknown, self.grid.geometry, self.samples, planar(pose))
         return bool(cost >= 0)
 
+    def leaves_map(self, pose: Pose) -> bool:
+        """Whether a part of the footprint lies off the map."""
+        c, s, (x, y) = math.cos(pose.yaw), math.sin(pose.yaw), self.samples.T
+        placed = np.column_stack([pose.x + c * x - s * y, pose.y + s * x + c * y])
+        return not bool(self.costmap.world_to_cells(placed)[1].all())
+
     def field(self, source: Pose) -> NDArray[np.float32]:
         """(n,) cost [cells] of the padded grid's cells from a pose's cell around what blocks the centre."""
         grid, first = self.grid, self.grid.index(self.grid.cell_of(source))

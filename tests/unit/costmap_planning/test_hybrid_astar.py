@@ -122,6 +122,14 @@ def test_start_walls_and_cancel_are_reported(make_plugin):
     assert plan(planner, (1, 1, 0), (9, 2, 0)).outcome == GetPathOutcome.OUT_OF_MAP
 
 
+def test_a_goal_whose_outline_hangs_over_the_border_says_so(make_plugin):
+    planner = make_plugin(HybridAStarPlanner, np.zeros((60, 60), dtype=np.uint8), resolution=0.1, footprint=CAR)
+    result = plan(planner, (3, 3, 0), (5.7, 3, 0))
+    assert result.outcome == GetPathOutcome.BLOCKED_GOAL
+    assert result.message.endswith("(5.70, 3.00, 0.00 rad): part of its outline would be off the map")
+    assert plan(planner, (3, 3, 0), (5.7, 3, math.pi)).success
+
+
 @pytest.mark.parametrize("radius", [4.0, 12.0, 20.0])
 def test_a_large_turning_circle_does_not_lead_through_a_wall(make_plugin, radius):
     cells = np.zeros((200, 200), dtype=np.uint8)
