@@ -224,7 +224,7 @@ class ControllerExecution:
     def _is_reached(self, pose: Pose, arrival: ArrivalCheck, dist_tolerance: float) -> bool:
         assert self._plan is not None
         ask = partial(self._controller.is_goal_reached, pose, dist_tolerance, arrival.angle_tolerance)
-        plugin_agrees = self._run.call("is_goal_reached", lambda: bool(ask()))
+        plugin_agrees = self._run.ask_whether("is_goal_reached", ask)
         return arrival.reached(pose, self._plan.tracker, plugin_agrees)
 
     def _come_to_rest(self, pose: Pose, velocity: Twist, lease: Lease) -> ControllerEnd | None:

@@ -6,6 +6,8 @@ import math
 import numbers
 from typing import TypeVar
 
+import numpy as np
+
 from mbf_abstract.geometry import Path
 from mbf_abstract.plugins import PluginResult
 
@@ -40,6 +42,13 @@ def checked_answer(answer: object, expected: type[A], plugin: str, method: str) 
     if problem:
         raise PluginFault(f"plugin {plugin!r} returned {problem}, from {method}")
     return answer
+
+
+def checked_flag(answer: object, plugin: str, method: str) -> bool:
+    """Return a plugin's yes or no; raises PluginFault for anything else, such as the None of a forgotten return."""
+    if not isinstance(answer, bool | np.bool_):
+        raise PluginFault(f"plugin {plugin!r} returned {type(answer).__name__} from {method}, not bool")
+    return bool(answer)
 
 
 def _wrong_plan(answer: PluginResult) -> str:

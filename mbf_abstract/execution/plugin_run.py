@@ -21,7 +21,7 @@ from mbf_abstract.compiling.compilation import unwatch_compiler, watch_compiler
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
-from mbf_abstract.execution.plugin_answer import A, PluginFault, PluginNonFinite, checked_answer
+from mbf_abstract.execution.plugin_answer import A, PluginFault, PluginNonFinite, checked_answer, checked_flag
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import NonFiniteError
 from mbf_abstract.goals.handle import AnyGoalHandle
@@ -161,6 +161,10 @@ class PluginRun(Generic[P]):
     def ask(self, method: str, function: Callable[[], object], expected: type[A]) -> A:
         """Call a main method and check its answer; raises as ``call``, also where the answer is no result."""
         return checked_answer(self.call(method, function), expected, self.plugin.name, method)
+
+    def ask_whether(self, method: str, function: Callable[[], object]) -> bool:
+        """Call a method that answers yes or no; raises as ``call``, also where the answer is neither."""
+        return checked_flag(self.call(method, function), self.plugin.name, method)
 
     def ask_reported(self, method: str, function: Callable[[], object], expected: type[A]) -> A:
         """Do the same between two events, for methods that are not called many times a second."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.maps.layers.layer_stack import LayerStack
@@ -19,6 +21,8 @@ def legal_box(box: object) -> CellBox:
     """What ``update_bounds`` of a layer has returned; raises TypeError if it is no box of cells."""
     if not isinstance(box, CellBox):
         raise TypeError(f"update_bounds must return a box of cells, got {type(box).__name__}")
+    if not all(isinstance(corner, int | np.integer) for corner in box):
+        raise TypeError(f"update_bounds must return a box of whole cells, got {tuple(box)}")
     return box
 
 

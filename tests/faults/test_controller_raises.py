@@ -44,3 +44,14 @@ def test_every_other_method_may_raise_too(method, monkeypatch):
         assert_stops(session, fault_time)
         monkeypatch.undo()
         assert_next_goals_work(session)
+
+
+@pytest.mark.parametrize("answer", [None, "no"])
+def test_an_arrival_that_is_neither_yes_nor_no_is_taken_for_neither(answer, monkeypatch):
+    with ScriptedSession() as session:
+        monkeypatch.setattr(type(session.controller), "is_goal_reached", lambda self, *arguments: answer)
+        result = session.navigator.send(ExePathGoal(session.path_to(50.0))).wait()
+        assert result.outcome == ExePathOutcome.INTERNAL_ERROR
+        assert f"plugin 'controller' returned {type(answer).__name__} from is_goal_reached, not bool" in result.message
+        monkeypatch.undo()
+        assert_next_goals_work(session)

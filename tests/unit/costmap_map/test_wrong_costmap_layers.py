@@ -5,6 +5,7 @@ import math
 import pytest
 
 from mbf_abstract.maps.layers.layer_list import LayerListError
+from mbf_costmap_nav.grid.costmap import CellBox
 from mbf_costmap_nav.layers.inflation import InflationLayer
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.map.layer import CostmapLayer
@@ -66,3 +67,12 @@ def test_a_speed_limit_that_is_none_is_no_reason_to_drive_backward(limit):
         costmap.speed_limit(1.0, 1.0, 0.5)
     costmap.layers["mine"].limit = 0.0
     assert costmap.speed_limit(1.0, 1.0, 0.5) == 0.0
+
+
+@pytest.mark.parametrize("start", [0.5, math.nan])
+def test_a_box_of_parts_of_cells_is_its_layers_fault_and_not_that_of_the_first_one_that_writes(start):
+    costmap = costmap_with(box=CellBox(start, 0, 1, 1))
+    with pytest.raises(TypeError):
+        costmap.update(None, 1.0)
+    expected = f"layer 'mine' raised TypeError: update_bounds must return a box of whole cells, got ({start}, 0, 1, 1)"
+    assert costmap.stale_reason(1.0) == expected
