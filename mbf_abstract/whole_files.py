@@ -10,12 +10,19 @@ from pathlib import Path
 
 @contextmanager
 def replacing(file: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a path of the same kind to write to; it takes the place of ``file`` when the block has ended well."""
+    """Yield a path of the same kind to write to; it takes the place of ``file`` when the block has ended well.
+
+    An OSError about that path names ``file``, which is what the user knows.
+    """
     file = Path(file)
     part = file.with_name(f".{file.stem}.{os.getpid()}.part{file.suffix}")
     try:
         yield part
         os.replace(part, file)
+    except OSError as error:
+        if error.filename in (part, str(part)):
+            error.filename, error.filename2 = str(file), None
+        raise
     finally:
         part.unlink(missing_ok=True)
 
