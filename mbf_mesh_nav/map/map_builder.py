@@ -43,7 +43,7 @@ from mbf_mesh_nav.map.height_error import with_height_error
 from mbf_mesh_nav.map.layer import LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_cache import LayerCache
 from mbf_mesh_nav.map.layer_graph import LayerGraph
-from mbf_mesh_nav.map.map_findings import frame_findings, header_findings, map_findings
+from mbf_mesh_nav.map.map_findings import frame_findings, header_findings, lying_findings, map_findings
 from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.densify import densify
@@ -105,6 +105,7 @@ def build_mesh_map(
         mesh_map.set_layers(graph, default, parameters.edge_cost_factor)
     report.findings += frame_findings(file, parameters.up_axis, parameters.unit)
     report.findings += [*header_findings(file), *map_findings(mesh_map)]
+    report.findings += lying_findings(mesh_map, file, parameters.up_axis)
     return mesh_map
 
 

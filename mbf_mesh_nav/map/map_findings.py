@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from mbf_abstract.geometry.arithmetic import norm
 from mbf_mesh_nav.files.elevation_files import elevation_readers
-from mbf_mesh_nav.files.file_frames import FileFrame, file_frame
+from mbf_mesh_nav.files.file_frames import GLTF_FORMATS, FileFrame, file_frame
 from mbf_mesh_nav.files.map_header import read_map_header
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot_answers import FORBIDDEN_COST
@@ -17,6 +19,12 @@ from mbf_mesh_nav.mesh.mesh_report import Finding
 LETHAL_SHARE = 0.95
 """A map with a greater share of lethal vertices is hardly intended."""
 AXES = ("x", "y", "z")
+STATES_UP = (*sorted(GLTF_FORMATS), ".dae")
+SIDES = ("x", "y", "z", "-x", "-y", "-z")
+FACING = 0.85
+"""Cosine of the angle between a normal and an axis below which a face does not look along it."""
+LYING = 1.75
+"""A mesh lies on its side if so many times as much of it looks along one axis as along either side of the others."""
 NOWHERE = np.zeros(0, dtype=np.int64)
 
 
@@ -49,6 +57,29 @@ def map_findings(mesh_map: MeshMap) -> Iterator[Finding]:
     yield from _coarse(mesh_map)
     yield from _lethal(mesh_map)
     yield from _narrow(mesh_map)
+
+
+def lying_findings(mesh_map: MeshMap, file: str, up_axis: str) -> Iterator[Finding]:
+    """One finding if a mesh seems to lie on its side; none where its file or ``up_axis`` states what is up.
+
+    Walls of a building look along x as much as along y; a floor that stands upright looks along one of them only.
+    """
+    stated = up_axis or not file or Path(file).suffix.lower() in (*STATES_UP, *elevation_readers())
+    if stated or (mesh_map.default_layer is not None and any(True for _ in _lethal(mesh_map))):  # that one says it, too
+        return
+    first, second, third = (mesh_map.vertices[mesh_map.faces[:, corner]] for corner in range(3))
+    along = np.hstack([mesh_map.face_normals, -mesh_map.face_normals])  # (F, 6): x, y, z, -x, -y, -z
+    side = np.where(along.max(axis=1) > FACING, along.argmax(axis=1), len(SIDES))
+    areas = np.bincount(side, norm(np.cross(second - first, third - first)), len(SIDES) + 1)
+    looking = (areas[: len(SIDES)] / max(math.fsum(areas.tolist()), 1e-12)).reshape(2, 3).max(axis=0).tolist()
+    axis = looking.index(max(looking))
+    most, beside = looking[axis], max(looking[:axis] + looking[axis + 1 :])
+    if axis != 2 and most >= LYING * beside:
+        text = (
+            f"{most:.0%} of the surface look to one side along {AXES[axis]}, at most {looking[2]:.0%} along z: if "
+            f"{AXES[axis]} is up in the file, set up_axis: {AXES[axis]}"
+        )
+        yield Finding("lying", text, NOWHERE, harmless=True)
 
 
 def _narrow(mesh_map: MeshMap) -> Iterator[Finding]:

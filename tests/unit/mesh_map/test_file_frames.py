@@ -127,6 +127,29 @@ def test_a_map_on_which_nearly_everything_is_lethal_says_so_and_guesses_the_axis
     assert "lethal" not in standing
 
 
+ROOM = np.array([(x, y, z) for x in (0.0, 4.0) for y in (0.0, 5.0) for z in (0.0, 1.5)])
+FLOOR, WALLS = [(0, 4, 6), (0, 6, 2)], [(0, 1, 4), (1, 5, 4), (2, 6, 3), (3, 6, 7), (0, 2, 1), (1, 2, 3)]
+
+
+@pytest.mark.parametrize(
+    ("turned", "up_axis", "says"),
+    [
+        ([0, 1, 2], "", ""),
+        (
+            [1, 2, 0],
+            "",
+            "51% of the surface look to one side along y, at most 19% along z: if y is up in the file, set up_axis: y",
+        ),
+        ([1, 2, 0], "z", ""),
+    ],
+)
+def test_a_room_that_lies_on_its_side_says_so_even_if_there_is_free_ground(tmp_path, turned, up_axis, says):
+    vertices = ROOM[:, turned]
+    trimesh.Trimesh(vertices, FLOOR + WALLS, process=False).export(tmp_path / "room.obj")
+    report = build_mesh_map(MeshMapParameters(mesh_file=str(tmp_path / "room.obj"), up_axis=up_axis)).report
+    assert says in report["lying"].text if says else "lying" not in report
+
+
 def test_the_server_passes_these_findings_on(tmp_path):
     exported(tmp_path / "hill.glb", HILL)  # z up, which no glTF is
     (tmp_path / "robot.yaml").write_text(
