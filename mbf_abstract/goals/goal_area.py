@@ -90,6 +90,9 @@ class PolygonArea(GoalArea):
     def __post_init__(self) -> None:
         if len(self.corners) < 3:
             raise ValueError(f"a polygon has at least three corners, got {len(self.corners)}")
+        for corner in self.corners:
+            if len(corner) != 3:
+                raise ValueError(f"a corner of a polygon has x, y and z [m], got {tuple(corner)}")
         if not abs(self._area()) > 0.0:
             raise ValueError("the polygon encloses no area")
 

@@ -139,3 +139,8 @@ def test_every_member_of_a_disc_is_inside_it():
 def test_an_area_without_inside_is_refused(make):
     with pytest.raises(ValueError):
         make()
+
+
+def test_a_polygon_of_flat_corners_says_what_a_corner_has():
+    with pytest.raises(ValueError, match=r"a corner of a polygon has x, y and z \[m\], got \(1.0, 10.0\)"):
+        PolygonArea(((1.0, 10.0), (3.0, 10.0), (3.0, 12.0)))
