@@ -88,6 +88,7 @@ class _LayerCheck:
         """Compute, compute again, and set the same parameters."""
         self._event("recompute", lambda layer: layer.recompute())
         computed = _values(self.layer)
+        self._expect_legal("compute", *self.twin.compute())  # a layer converts what it takes over
         self._event("second recompute", lambda layer: layer.recompute())
         self._expect_same(computed, "a second recompute changed the values")
         if self.layer.inputs:
@@ -119,7 +120,7 @@ class _LayerCheck:
         before = _values(self.layer)
         changed = event(self.layer)
         event(self.twin)
-        legal = self._expect_legal(situation)
+        legal = self._expect_legal(situation, self.layer.costs, self.layer.lethal)
         same = self._expect_same(_values(self.twin), f"{situation}: two instances have different values")
         if legal and same:
             after = _values(self.layer)
@@ -127,16 +128,16 @@ class _LayerCheck:
             text = f"{situation}: the vertices it returned are not those that changed"
             self.report.expect(np.array_equal(changed, expected), text)
 
-    def _expect_legal(self, situation: str) -> bool:
+    def _expect_legal(self, situation: str, costs: CostArray, lethal: LethalArray) -> bool:
         count = self.layer.topology.vertex_count
         legal = True
-        for name, array, dtype in (("costs", self.layer.costs, np.float32), ("lethal", self.layer.lethal, np.bool_)):
+        for name, array, dtype in (("costs", costs, np.float32), ("lethal", lethal, np.bool_)):
             good = array.shape == (count,) and array.dtype == dtype
             text = f"{situation}: {name} are {array.dtype} {array.shape}, expected {np.dtype(dtype)} {(count,)}"
             self.report.expect(good, text)
             legal = legal and good
-        wrong = np.flatnonzero(~(self.layer.costs >= 0.0))
-        example = f"{self.layer.costs[wrong[0]]} at vertex {wrong[0]}" if len(wrong) else ""
+        wrong = np.flatnonzero(~(costs >= 0.0))
+        example = f"{costs[wrong[0]]} at vertex {wrong[0]}" if len(wrong) else ""
         self.report.expect(not len(wrong), f"{situation}: {len(wrong)} costs are NaN or negative, e.g. {example}")
         return legal and not len(wrong)
 
