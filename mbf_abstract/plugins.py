@@ -241,6 +241,11 @@ class AbstractController(Plugin):
         self.refusal = reason
         return False
 
+    def hand_on(self, inner: AbstractController, path: Path) -> bool:
+        """``set_plan`` of a controller inside this one, for this one's own: what it refuses, this one refuses."""
+        inner.refusal = ""
+        return inner.set_plan(path) or self.refuse(inner.refusal)
+
     @abstractmethod
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """Compute the command of this cycle; one call should take less than a control period."""

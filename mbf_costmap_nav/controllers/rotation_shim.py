@@ -69,7 +69,7 @@ class RotationShimController(PathFollower):
     def set_plan(self, path: Path) -> bool:
         """Hand the path to both; alignment starts over."""
         self._aligning = True
-        return super().set_plan(path) and (self._inner.set_plan(path) or self.refuse(self._inner.refusal))
+        return super().set_plan(path) and self.hand_on(self._inner, path)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Delegated to the inner controller."""

@@ -219,6 +219,14 @@ def command_at(controller, yaw, velocity=None):
     return controller.compute_velocity_commands(ControlRequest(Pose.planar(1, 1, yaw), velocity or Twist())).command
 
 
+def test_the_shim_refuses_what_its_inner_controller_refuses_and_for_no_earlier_reason(shim):
+    path = Path.from_points([(1, 1, 0), (2, 1, 0)])
+    shim._inner.set_plan = lambda path: shim._inner.refuse("too long")
+    assert not shim.set_plan(path) and shim.refusal == "too long"
+    shim._inner.set_plan = lambda path: False
+    assert not shim.set_plan(path) and shim.refusal == ""
+
+
 def test_the_shim_turns_first_and_then_lets_the_inner_controller_drive(shim):
     shim.set_plan(CORNER)
     assert command_at(shim, math.pi / 2).vx == 0.0 and command_at(shim, math.pi / 2).wz < 0.0

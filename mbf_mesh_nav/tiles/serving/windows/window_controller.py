@@ -35,8 +35,8 @@ class WindowController(OnWindow[MeshController], AbstractController):
     def set_plan(self, path: Path) -> bool:
         """Take over a path, which may lead out of the window."""
         self._tracker, self._accepted = None, True
-        if not self._on_window().set_plan(path):
-            return self.refuse(self._inner.refusal)
+        if not self.hand_on(self._on_window(), path):
+            return False
         self._tracker = PathTracker(path)
         return True
 
