@@ -17,7 +17,7 @@ import numpy as np
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
-from mbf_mesh_nav.kernels.layers.chassis import scratch_for
+from mbf_mesh_nav.kernels.layers.chassis import Scratch, scratch_for
 from mbf_mesh_nav.kernels.layers.footprint_sweep import uses_along
 from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.map.mesh_map import MeshMap
@@ -54,6 +54,7 @@ class HeadingCheck:
     def __init__(self, mesh_map: MeshMap) -> None:
         self._mesh_map = mesh_map
         self._some_forbidden: tuple[BoolArray, BoolArray] | None = None
+        self._kept_scratch: Scratch | None = None
 
     def leg_that_holds(
         self, query: LegQuery, layer: TiltLayer, leg: Leg, plan_again: Callable[[LegQuery], Leg | None]
@@ -107,12 +108,17 @@ class HeadingCheck:
         chords -= _points_at(leg, lengths, middles[places] - 0.5 * CHORD)
         flat = norm(chords[:, :2])
         places, chords = places[flat > 0.0], (chords[:, :2] / flat[:, None])[flat > 0.0]
-        scratch, chassis = scratch_for(len(mesh_map.vertices)), chassis_of(layer)
         sweep = spots.faces[places], points[places], points[places + 1], chords
-        uses = uses_along(mesh_map.topology.surface, chassis, scratch, *sweep)
+        uses = uses_along(mesh_map.topology.surface, chassis_of(layer), self._scratch(), *sweep)
         beyond = uses > 1.0
         places = places[beyond]
         return Refused(spots.points[places], vertices[places], uses[beyond])
+
+    def _scratch(self) -> Scratch:
+        """Memory for sweeps: a planner belongs to one thread at a time."""
+        if self._kept_scratch is None or len(self._kept_scratch.seen) != len(self._mesh_map.vertices):
+            self._kept_scratch = scratch_for(len(self._mesh_map.vertices))
+        return self._kept_scratch
 
     def _allow_less(self, layer: TiltLayer, share: float) -> BoolArray:
         """Vertices (V,) that allow less than a share of the headings."""

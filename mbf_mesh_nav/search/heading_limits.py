@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray
-from mbf_mesh_nav.kernels.layers.chassis import Chassis, scratch_for
+from mbf_mesh_nav.kernels.layers.chassis import Chassis, Scratch, scratch_for
 from mbf_mesh_nav.kernels.layers.footprint_sweep import greatest_use
 from mbf_mesh_nav.kernels.mesh.slopes import slopes_of_edges, tilt_of_normals
 from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, FORBIDDEN, HEADING_STEP, HEADINGS
@@ -43,6 +43,8 @@ class HeadingLimits(Protocol):
         What is known of each move of a drive graph, see ``kernels.search.heading_astar``.
     chassis : Chassis
         For moves of which nothing is known.
+    scratch : Scratch
+        Memory for sweeps on this map, of one thread at a time.
     knows_footprint : bool
         Whether the limits hold on lines over several faces, too.
     """
@@ -51,6 +53,7 @@ class HeadingLimits(Protocol):
     roll: Float32Array
     known: NDArray[np.uint8]
     chassis: Chassis
+    scratch: Scratch
     knows_footprint: bool
 
     def standing(self, place: SurfacePoint, yaw: float) -> float:
@@ -70,7 +73,7 @@ class FootprintLimits:
         self.known = np.zeros(len(graph.moves.ends), dtype=np.uint8)
         self.chassis = chassis_of(layer)
         self._surface = mesh_map.topology.surface
-        self._vertex_count = len(mesh_map.vertices)
+        self.scratch = scratch_for(len(mesh_map.vertices))
 
     def standing(self, place: SurfacePoint, yaw: float) -> float:
         """See ``HeadingLimits``."""
@@ -84,8 +87,7 @@ class FootprintLimits:
 
     def _use(self, face: int, start: FloatArray, end: FloatArray, cosine: float, sine: float) -> float:
         points = tuple(start.tolist()), tuple(end.tolist())
-        scratch = scratch_for(self._vertex_count)
-        return float(greatest_use(self._surface, self.chassis, scratch, int(face), *points, cosine, sine))
+        return float(greatest_use(self._surface, self.chassis, self.scratch, int(face), *points, cosine, sine))
 
 
 class NormalLimits:
@@ -97,6 +99,7 @@ class NormalLimits:
     def __init__(self, mesh_map: MeshMap, max_roll: float, max_pitch: float, graph: DriveGraph) -> None:
         self._mesh_map = mesh_map
         self.angles = max_roll, max_pitch
+        self.scratch = scratch_for(len(mesh_map.vertices))
         headings = np.asarray(np.arange(HEADINGS) * HEADING_STEP, dtype=np.float64)
         self.allowed, self.roll = tilt_of_normals(mesh_map.vertex_normals, headings, max_roll, max_pitch)
         edges = mesh_map.vertices, mesh_map.neighbour_offsets, mesh_map.neighbours

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.layers.chassis import scratch_for
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, follow_predecessors, propagate_distances
 from mbf_mesh_nav.kernels.search.goal_bound import GoalBound, weights_of_arrivals
 from mbf_mesh_nav.kernels.search.heading_astar import FORBIDDEN, HEADINGS, find_out_along, search_with_heading
@@ -81,14 +80,14 @@ class HeadingSearch:
         if not len(start[0]) or not len(goal[0]):
             return None
         task = _Task(query, limits, costs, self._weights(query), start, goal)
-        bound, scratch = self._bound(task), scratch_for(len(self._mesh_map.vertices))
+        bound = self._bound(task)
         for lazy_searches in range(LAZY_SEARCHES + 1):
             looks = lazy_searches == LAZY_SEARCHES
             best, cost, _, predecessors = self._search(task, bound, looks)
             if best < 0:
                 return None
             chain = follow_predecessors(predecessors, best)[::-1] // HEADINGS
-            of_path = self.graph.moves, chain, limits.known, limits.chassis, scratch
+            of_path = self.graph.moves, chain, limits.known, limits.chassis, limits.scratch
             if looks or find_out_along(self._mesh_map.topology.surface, *of_path):
                 return chain, cost
         return None
@@ -135,7 +134,7 @@ class HeadingSearch:
             bound,
             limits.known,
             limits.chassis,
-            scratch_for(len(mesh_map.vertices)),
+            limits.scratch,
             looks,
             query.cancel_flag,
         )

@@ -29,7 +29,10 @@ class Chassis(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Memory of one search: last mark of each vertex (V,), members (V,), last mark (1,), wheels and their faces."""
+    """Memory of one search after the other: vertices' marks and members (V,), last mark (1,), wheels, their faces.
+
+    Each search makes a mark of its own, so nothing is cleared between two; marks repeat after 2^32 searches.
+    """
 
     seen: IntArray
     members: IntArray

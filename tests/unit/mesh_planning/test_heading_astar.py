@@ -13,6 +13,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_mesh_nav.kernels.compiled import Index, kernel
+from mbf_mesh_nav.kernels.layers.chassis import Scratch, scratch_for
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, propagate_distances
 from mbf_mesh_nav.kernels.search.goal_bound import GoalBound, bound_at, weights_of_arrivals
 from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, FORBIDDEN, HEADING_STEP, HEADINGS
@@ -38,6 +39,7 @@ class RandomLimits:
     allowed: np.ndarray
     roll: np.ndarray
     known: np.ndarray
+    scratch: Scratch
     chassis = NO_CHASSIS
     knows_footprint = False
 
@@ -45,7 +47,7 @@ class RandomLimits:
     def on(cls, search, vertex_count, rng):
         known = np.where(rng.random(len(search.graph.moves.ends)) < 0.9, DRIVABLE, FORBIDDEN).astype(np.uint8)
         roll = rng.uniform(-0.4, 0.4, (vertex_count, 16)).astype(np.float32)
-        return cls(rng.random((vertex_count, 16)) < 0.85, roll, known)
+        return cls(rng.random((vertex_count, 16)) < 0.85, roll, known, scratch_for(vertex_count))
 
 
 def query_between(mesh_map, start, goal):
