@@ -9,7 +9,7 @@ Simulated time passes in steps of a tenth of a second, so a recording whose own 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from itertools import islice
 from typing import Any
 
@@ -106,7 +106,7 @@ def _check_step(bag: Bag, last: int, time: int) -> None:
 
 
 def _date(time: int) -> str:
-    return datetime.fromtimestamp(time // NANOSECONDS, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+    return datetime.fromtimestamp(time // NANOSECONDS, timezone.utc).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
 def check_seconds(option: str, seconds: float) -> None:
