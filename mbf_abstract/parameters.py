@@ -9,11 +9,13 @@ Example
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from mbf_abstract.config.known_keys import key_hint
+from mbf_abstract.config.findings import KeyPath, describe_value, format_key_path
+from mbf_abstract.config.mistakes import mistakes_of
 
 
 class ParameterModel(BaseModel):
@@ -29,8 +31,29 @@ class PluginParameters(ParameterModel):
 Parameters = TypeVar("Parameters", bound=ParameterModel)
 
 
+class ParameterError(ValueError):
+    """Values that a block of parameters does not take; for each ``key: expected X with range and unit, got Y``."""
+
+
+def checked_parameters(model: type[Parameters], values: Mapping[str, Any], where: KeyPath = ()) -> Parameters:
+    """Make the parameters of a block; ``where`` leads to it, for the text of the ParameterError that this may raise."""
+    return _made(model, values, values, where)
+
+
+def _made(model: type[Parameters], values: Mapping[str, Any], new: Mapping[str, Any], where: KeyPath) -> Parameters:
+    """Make parameters; what is wrong with a block as a whole is said of its ``new`` values."""
+    block = dict(values)
+    try:
+        return model.model_validate(block)
+    except ValidationError as error:
+        wrong = mistakes_of(model, block, error.errors(include_url=False))
+    came = ", ".join(f"{key}: {describe_value(value)}" for key, value in new.items())
+    texts = [(one if one.loc else replace(one, got=came or one.got)).text(where) for one in wrong]
+    raise ParameterError("; ".join(texts))
+
+
 def with_changes(
-    parameters: Parameters, changes: Mapping[str, Any], read_once: Collection[str] | None = None
+    parameters: Parameters, changes: Mapping[str, Any], read_once: Collection[str] | None = None, where: KeyPath = ()
 ) -> Parameters:
     """Return validated parameters in which some values are changed at run time.
 
@@ -38,25 +61,23 @@ def with_changes(
     ----------
     read_once : collection of str, optional
         What must stay; without it all that is declared as not dynamic.
+    where : key path
+        Leads to the block, for texts of errors.
 
     Raises
     ------
-    ValueError
-        There is no such parameter, a value is not legal (pydantic's ValidationError is one), or a parameter is read
-        only once, at the start.
+    ParameterError
+        There is no such parameter, a value is not legal, or a parameter is read only once, at the start.
     """
     model = type(parameters)
-    unknown = [key for key in changes if key not in model.model_fields]
-    if unknown:
-        hints = [(key, key_hint(key, model.model_fields)) for key in unknown]
-        raise ValueError("; ".join(f"{key}: expected a known parameter{hint and ', ' + hint}" for key, hint in hints))
-    new = model.model_validate({**parameters.model_dump(), **changes})
+    new = _made(model, {**parameters.model_dump(), **changes}, changes, where)
     if read_once is None:
         fields = model.model_fields.items()
         read_once = [name for name, field in fields if not (field.json_schema_extra or {}).get("dynamic", True)]  # type: ignore[union-attr]
     fixed = [name for name in read_once if getattr(new, name) != getattr(parameters, name)]
     if fixed:
-        raise ValueError(f"{', '.join(fixed)}: read once, at the start, and cannot be changed at run time")
+        keys = ", ".join(format_key_path((*where, name)) for name in fixed)
+        raise ParameterError(f"{keys}: read once, at the start, and cannot be changed at run time")
     return new
 
 

@@ -10,18 +10,19 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 
 from mbf_abstract.config.configuration import Config, PluginDeclaration
-from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.findings import ConfigError, Finding, describe_value
 from mbf_abstract.config.registry import Adapter
 from mbf_abstract.events import EventKind
 from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.maps.view import FloorMap, GridView
-from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.parameters import ParameterError, ParameterModel, parameter
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.server.map_server import MapServer
 from mbf_costmap_nav.files.map_description import MapError
@@ -138,8 +139,11 @@ class CostmapNavigationServer(MapServer):
 
     def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
         """An outline, or the radius of a round robot."""
-        if isinstance(footprint, int | float):
-            return {"footprint": None, "robot_radius": footprint}
+        if isinstance(footprint, bool) or footprint is None:
+            came = describe_value(footprint)
+            raise ParameterError(f"footprint: expected corners [[x, y], ...] or a radius in m, got {came}")
+        if isinstance(footprint, Real):
+            return {"footprint": None, "robot_radius": float(footprint)}
         return {"footprint": footprint}
 
     @classmethod

@@ -15,7 +15,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.execution.arrival import ArrivalCheck, ToleranceCheck
 from mbf_abstract.execution.controller import ControllerExecution
 from mbf_abstract.execution.controller_state import ControllerEnd, Plan
-from mbf_abstract.execution.plan_check import arrival_problem, path_in_global_frame
+from mbf_abstract.execution.plan_check import area_in_global_frame, path_in_global_frame, tolerance_problem
 from mbf_abstract.execution.progress import PathProgress
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.tangent_plane import SAME_STOREY
@@ -50,14 +50,14 @@ class ExePathAction(PluginAction[ExePathGoal, ExePathResult, ExePathFeedback, Ab
         return goal.controller
 
     def _problem(self, goal: ExePathGoal) -> tuple[int, str] | None:
-        """1. Accept only a path with poses, positive tolerances and an area in the global frame."""
-        problem = "the path has no poses" if len(goal.path) == 0 else arrival_problem(goal, self.runtime)
+        """1. Accept only a path with poses and positive tolerances."""
+        problem = "the path has no poses" if len(goal.path) == 0 else tolerance_problem(goal)
         return (ExePathOutcome.INVALID_PATH, problem) if problem else None
 
     def execute(self, job: Job) -> ExePathResult:
         """Run the control loop; the goal it ends with may be a later one than it began with."""
         plugin = self._plugin(job)
-        # 2. The path in the global frame.
+        # 2. The path, and the area to end in, in the global frame.
         try:
             first_plan = self._plan(job.handle.goal)
         except TransformError as error:
@@ -92,7 +92,7 @@ class ExePathAction(PluginAction[ExePathGoal, ExePathResult, ExePathFeedback, Ab
             parameters.dist_tolerance if goal.dist_tolerance is None else goal.dist_tolerance,
             parameters.angle_tolerance if goal.angle_tolerance is None else goal.angle_tolerance,
             self._tolerance_check(),
-            goal.goal_area,
+            area_in_global_frame(goal.goal_area, self.runtime),
             math.inf if self.runtime.map_hooks.ground_is_level else SAME_STOREY,
         )
         return Plan(path, arrival)

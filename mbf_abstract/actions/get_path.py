@@ -7,6 +7,7 @@ Steps of one goal: check names and frames - start pose - map kept alive - plugin
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from mbf_abstract.actions.action import GoalJob
@@ -14,11 +15,12 @@ from mbf_abstract.actions.plugin_action import PluginAction
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
-from mbf_abstract.execution.plan_check import area_problem, in_global_frame, path_result
+from mbf_abstract.execution.plan_check import area_in_global_frame, in_global_frame, path_result
 from mbf_abstract.execution.planner import FALLBACK_OUTCOMES, PlannerExecution, PlannerState
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.feedback_types import NoFeedback
+from mbf_abstract.goals.goal_area import GoalArea
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.goals.result_types import GetPathResult
@@ -48,12 +50,11 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         return goal.planner
 
     def _problem(self, goal: GetPathGoal) -> tuple[int, str] | None:
-        """1. Accept only what can be answered: sane tolerances, an area in the global frame."""
+        """1. Accept only what can be answered: sane tolerances."""
         distance, angle = self._tolerances(goal)
         if not (distance >= 0.0 and angle >= 0.0):  # not a number is no tolerance either
             return GetPathOutcome.INVALID_GOAL, f"tolerances must not be negative, got {distance} m and {angle} rad"
-        problem = area_problem(goal.goal_area, self.runtime)
-        return (GetPathOutcome.INVALID_GOAL, problem) if problem else None
+        return None
 
     def execute(self, job: Job) -> GetPathResult:
         """2. to 4.: from the accepted goal to its result, on the slot's thread."""
@@ -61,17 +62,18 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         # 2. Everything the planner sees is in the global frame.
         try:
             request = self._request(handle.goal, handle)
+            area = area_in_global_frame(handle.goal.goal_area, self.runtime)
         except (TransformError, RobotStateError) as error:
             return GetPathResult(GetPathOutcome.TF_ERROR, str(error), planner=plugin.name)
         job.report_started(plugin=plugin.name)
         # 3. Plan; where there is no path for this planner there may be one for the other.
         fallback = self._fallback_of(plugin)
-        first = self._plan(job, plugin, request, has_fallback=bool(fallback))
+        first = self._plan(job, plugin, request, area, has_fallback=bool(fallback))
         if not fallback or first.permanent or first.outcome not in FALLBACK_OUTCOMES or handle.cancel_requested:
             return first
         if problem := self._plugins.problem(self.kind, fallback):
             return replace(first, message=f"{first.message}; fallback_planner: {problem}")
-        second = self._plan(job, self._plugins.get(self.kind, fallback), request)
+        second = self._plan(job, self._plugins.get(self.kind, fallback), request, area)
         return replace(second, message=f"{fallback}: {second.message}; before, {plugin.name}: {first.message}")
 
     def _fallback_of(self, plugin: LoadedPlugin[AbstractPlanner]) -> str:
@@ -80,7 +82,12 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         return "" if name == plugin.name else name
 
     def _plan(
-        self, job: Job, plugin: LoadedPlugin[AbstractPlanner], request: PlanRequest, has_fallback: bool = False
+        self,
+        job: Job,
+        plugin: LoadedPlugin[AbstractPlanner],
+        request: PlanRequest,
+        area: GoalArea | None,
+        has_fallback: bool = False,
     ) -> GetPathResult:
         """Plan with the map kept alive, under patience and retries, and judge how it ended."""
         handle, run = job.handle, self._supervise(job, plugin)
@@ -88,11 +95,12 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
             if missing := run.call_beside("the map's missing_floor()", self.runtime.map_hooks.missing_floor):
                 # permanent: no recovery brings a map
                 return GetPathResult(GetPathOutcome.MAP_ERROR, missing, planner=plugin.name, permanent=True)
-            execution = PlannerExecution(run, request, handle.goal.goal_area, has_fallback)
+            execution = PlannerExecution(run, request, area, has_fallback)
             state = execution.execute()
-        if run.waited and not run.canceled:
-            return GetPathResult(GetPathOutcome.PAT_EXCEEDED, run.waited, planner=plugin.name)
-        return self._result(state, execution.last_result, handle, request, plugin.name)
+            if run.waited and not run.canceled:
+                return GetPathResult(GetPathOutcome.PAT_EXCEEDED, run.waited, planner=plugin.name)
+            judge = partial(self._result, state, execution.last_result, handle, request, area, plugin.name)
+            return run.call_beside("the map's path_problem()", judge)
 
     def _request(self, goal: GetPathGoal, handle: Handle) -> PlanRequest:
         def to_global(pose: Pose) -> Pose:
@@ -117,7 +125,13 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         return distance, usual[1] if goal.angle_tolerance is None else goal.angle_tolerance
 
     def _result(
-        self, state: PlannerState, last: PlanResult | None, handle: Handle, request: PlanRequest, planner: str
+        self,
+        state: PlannerState,
+        last: PlanResult | None,
+        handle: Handle,
+        request: PlanRequest,
+        area: GoalArea | None,
+        planner: str,
     ) -> GetPathResult:
         fields: dict[str, Any] = {"planner": planner}
         if last is None:
@@ -125,7 +139,7 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         else:
             fields.update(plugin_outcome=int(last.outcome), plugin_message=last.message)
         if state is PlannerState.FOUND_PLAN:
-            return self._found(last, handle, request, planner)
+            return self._found(last, handle, request, area, planner)
         if state is PlannerState.CANCELED:
             return GetPathResult(GetPathOutcome.CANCELED, handle.cancel_reason, **fields)
         if state is PlannerState.PAT_EXCEEDED:
@@ -133,9 +147,11 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
             return GetPathResult(GetPathOutcome.PAT_EXCEEDED, f"no plan within {self.patience:g} s{tail}", **fields)
         return GetPathResult(int(last.outcome), last.message, cost=last.cost, permanent=last.permanent, **fields)
 
-    def _found(self, answer: PlanResult, handle: Handle, request: PlanRequest, planner: str) -> GetPathResult:
+    def _found(
+        self, answer: PlanResult, handle: Handle, request: PlanRequest, area: GoalArea | None, planner: str
+    ) -> GetPathResult:
         """4. Check the path of a plugin that reports success."""
-        result = path_result(answer, request, self.runtime, planner, handle.goal.goal_area)
+        result = path_result(answer, request, self.runtime, planner, area)
         if result.path is not None:
             numbers = {"cost": result.cost, "length": result.path.length, "poses": len(result.path)}
             self.runtime.events.emit(EventKind.PLAN, self.name, goal_id=handle.id, plugin=planner, **numbers)

@@ -41,7 +41,7 @@ from mbf_abstract.actions.recovery import RecoveryAction
 from mbf_abstract.actions.refine_path import RefinePathAction
 from mbf_abstract.actions.sub_goals import SubActions
 from mbf_abstract.drive.robot import RobotStateError
-from mbf_abstract.execution.plan_check import arrival_problem, in_global_frame
+from mbf_abstract.execution.plan_check import area_in_global_frame, in_global_frame, tolerance_problem
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
@@ -91,7 +91,7 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, MoveBaseFeedback]):
             problem = self._plugins.problem(kind, name)
             if problem:
                 return MoveBaseOutcome.FAILURE, problem
-        problem = arrival_problem(goal, self.runtime)
+        problem = tolerance_problem(goal)
         if goal.via and goal.goal_area is not None:
             problem = problem or "via poses lead to a target pose, not to a goal area; give one of the two"
         return (MoveBaseOutcome.FAILURE, problem) if problem else None
@@ -102,9 +102,10 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, MoveBaseFeedback]):
         try:
             self.runtime.robot.pose()
             target, via = self._target(job.handle), via_of(job.handle.goal, self.runtime)
+            area = area_in_global_frame(job.handle.goal.goal_area, self.runtime)
         except (RobotStateError, TransformError) as error:
             return self.make_result(job.handle, MoveBaseOutcome.TF_ERROR, str(error))
-        machine = MoveBaseMachine(self._sub_actions, self._plugins, job, target, via)
+        machine = MoveBaseMachine(self._sub_actions, self._plugins, job, target, via, area)
         with job.open_to_take_over(lambda goal: True, machine.wake):
             outcome, message = machine.run()
         return self.make_result(job.handle, outcome, message)

@@ -11,12 +11,13 @@ from mbf_abstract.actions.sub_goals import Job, SubActions, SubGoals
 from mbf_abstract.actions.via_poses import ViaPoses
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.motion_watch import OscillationDetector
-from mbf_abstract.execution.plan_check import in_global_frame
+from mbf_abstract.execution.plan_check import area_in_global_frame, in_global_frame
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.arrival_tolerance import planned_tolerance, tolerance_left
 from mbf_abstract.goals.feedback_types import ExePathFeedback, MoveBaseFeedback
+from mbf_abstract.goals.goal_area import GoalArea
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.goals.result_types import GetPathResult, RefinePathResult
@@ -38,12 +39,20 @@ def via_of(goal: MoveBaseGoal, runtime: Runtime) -> ViaPoses:
 class MoveBaseMachine:
     """One run of move_base, for one goal or several that take over from each other."""
 
-    def __init__(self, sub_actions: SubActions, plugins: PluginTable, job: Job, target: Pose, via: ViaPoses) -> None:
+    def __init__(
+        self,
+        sub_actions: SubActions,
+        plugins: PluginTable,
+        job: Job,
+        target: Pose,
+        via: ViaPoses,
+        area: GoalArea | None = None,
+    ) -> None:
         self._runtime = job.action.runtime
         self._job = job
         self._target, self._via = target, via
         self._state = MoveBaseState.GET_PATH
-        self._goals = SubGoals(sub_actions, job)
+        self._goals = SubGoals(sub_actions, job, area)
         self._failure: tuple[Trigger, End] | None = None
         self._ending: End | None = None
         self._recoveries = RecoverySequence(self._runtime, plugins)
@@ -245,6 +254,7 @@ class MoveBaseMachine:
         try:
             goal = self._job.handle.goal
             self._target, self._via = in_global_frame(goal.target_pose, self._runtime), via_of(goal, self._runtime)
+            self._goals.area = area_in_global_frame(goal.goal_area, self._runtime)
         except TransformError as error:
             self._end_after_stop((MoveBaseOutcome.TF_ERROR, str(error)))
             return

@@ -11,7 +11,6 @@ from typing import Any
 
 from mbf_abstract.actions.action import GoalJob
 from mbf_abstract.actions.plugin_action import PluginAction
-from mbf_abstract.config.findings import text_of
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.recovery import RecoveryExecution
 from mbf_abstract.goals.feedback_types import NoFeedback
@@ -52,8 +51,7 @@ class RecoveryAction(PluginAction[RecoveryGoal, RecoveryResultMessage, NoFeedbac
         try:
             with_changes(plugin.instance.parameters, goal.parameters)
         except ValueError as error:
-            wrong = "; ".join(text_of(error).splitlines())
-            return RecoveryOutcome.FAILURE, f"parameters of recovery {plugin.name!r}: {wrong}"
+            return RecoveryOutcome.FAILURE, f"parameters of recovery {plugin.name!r}: {error}"
         return None
 
     def execute(self, job: Job) -> RecoveryResultMessage:

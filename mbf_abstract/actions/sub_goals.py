@@ -13,6 +13,7 @@ from mbf_abstract.actions.recovery import RecoveryAction
 from mbf_abstract.actions.refine_path import RefinePathAction
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.feedback_types import MoveBaseFeedback
+from mbf_abstract.goals.goal_area import GoalArea
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.goals.result_types import MoveBaseResult
@@ -38,12 +39,15 @@ class SubGoals:
     ----------
     plan, follow, recover : GoalHandle or None
         The goal that plans, or refines the plan; the one that follows a path; the one that recovers.
+    area : GoalArea or None
+        Where the goal of the job ends, in the global frame.
     """
 
-    def __init__(self, actions: SubActions, job: Job) -> None:
+    def __init__(self, actions: SubActions, job: Job, area: GoalArea | None = None) -> None:
         self.plan: AnyGoalHandle | None = None
         self.follow: AnyGoalHandle | None = None
         self.recover: AnyGoalHandle | None = None
+        self.area = area
         self._actions = actions
         self._job = job
         self._condition = job.action.runtime.clock.condition()
@@ -60,7 +64,7 @@ class SubGoals:
                 planner=goal.planner,
                 dist_tolerance=dist_tolerance,
                 angle_tolerance=goal.angle_tolerance,
-                goal_area=goal.goal_area,
+                goal_area=self.area,
                 via=via,
                 concurrency_slot=SUB_GOAL_SLOT,
             ),
@@ -80,7 +84,7 @@ class SubGoals:
                 controller=goal.controller,
                 dist_tolerance=dist_tolerance,
                 angle_tolerance=goal.angle_tolerance,
-                goal_area=goal.goal_area,
+                goal_area=self.area,
                 concurrency_slot=SUB_GOAL_SLOT,
             ),
         )

@@ -28,6 +28,12 @@ def command_problem(command: object) -> str:
     return "" if finite else f"a command must be finite, got {command}"
 
 
+def require_command(command: object) -> None:
+    """Raise TypeError for what is no command of either type: a fault of who made it, which no later call changes."""
+    if type(command) not in (Twist, AckermannCommand):
+        raise TypeError(command_problem(command))
+
+
 def stands_still(command: Command) -> bool:
     """Whether a command asks for no motion at all, also along z and about x and y; a car's wheels may be turned."""
     if isinstance(command, AckermannCommand):

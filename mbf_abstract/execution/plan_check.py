@@ -1,6 +1,7 @@
 """Checks of what a goal asks for and of the path a planner returns, and their transformation to the global frame.
 
-A planner may report success for an empty path, a path in another frame, or one that starts or ends somewhere else.
+A planner may report success for an empty path, a path in another frame, one that starts or ends somewhere else, or one
+that leads off the map.
 Each becomes a failure that names what is wrong, so that no controller ever follows such a path.
 """
 
@@ -8,12 +9,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbf_abstract.event_values import error_text
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.geometry.transform import Transform, TransformError
 from mbf_abstract.goals.goal_area import GoalArea
 from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal
 from mbf_abstract.goals.result_types import GetPathResult
+from mbf_abstract.goals.transformed_area import TransformedArea
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 
@@ -28,21 +31,21 @@ def path_in_global_frame(path: Path, runtime: Runtime) -> Path:
     return runtime.transforms.transform_path(path, runtime.robot.global_frame)
 
 
-def area_problem(area: GoalArea | None, runtime: Runtime) -> str:
-    """Why a goal area can not be used; empty if it can, or if there is none."""
-    frame = runtime.robot.global_frame
-    if area is None or area.frame_id == frame:
-        return ""
-    return f"a goal area must be given in the global frame {frame!r}, got {area.frame_id!r}"
+def area_in_global_frame(area: GoalArea | None, runtime: Runtime) -> GoalArea | None:
+    """Return an area as it lies in the global frame now; raises TransformError where its frame is not known."""
+    if area is None or area.frame_id == runtime.robot.global_frame:
+        return area
+    origin = in_global_frame(Pose.planar(0.0, 0.0, frame_id=area.frame_id), runtime)
+    return TransformedArea(area, Transform.from_pose(origin, area.frame_id))
 
 
-def arrival_problem(goal: ExePathGoal | MoveBaseGoal, runtime: Runtime) -> str:
-    """Why the tolerances or the goal area of a goal can not be used; empty if they can."""
+def tolerance_problem(goal: ExePathGoal | MoveBaseGoal) -> str:
+    """Why the tolerances of a goal can not be used; empty if they can."""
     for name in ("dist_tolerance", "angle_tolerance"):
         value = getattr(goal, name)
         if value is not None and not value > 0.0:  # not a number is no tolerance either
             return f"{name} must be positive, got {value}"
-    return area_problem(goal.goal_area, runtime)
+    return ""
 
 
 def check_path(answer: PlanResult, request: PlanRequest, runtime: Runtime, area: GoalArea | None = None) -> PlanResult:
@@ -66,7 +69,18 @@ def check_path(answer: PlanResult, request: PlanRequest, runtime: Runtime, area:
         if distance > tolerance + slack:
             text = f"pose {index} of the path is {distance:.2f} m from the {name}, allowed {tolerance + slack:.2f} m"
             return PlanResult(GetPathOutcome.INTERNAL_ERROR, text)
+    if problem := _off_the_map(path, runtime):
+        return PlanResult(GetPathOutcome.INTERNAL_ERROR, problem)
     return PlanResult(answer.outcome, answer.message, path, answer.cost)
+
+
+def _off_the_map(path: Path, runtime: Runtime) -> str:
+    """Where a path leads off the map; also that the map could not say so."""
+    try:
+        problem: object = runtime.map_hooks.path_problem(path)
+    except Exception as error:
+        return f"the map's path_problem raised {type(error).__name__}: {error_text(error)}"
+    return str(problem) if problem else ""
 
 
 def path_result(

@@ -8,7 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from mbf_abstract.geometry import Path
+from mbf_abstract.drive.commands import command_problem
+from mbf_abstract.geometry import AckermannCommand, Path, Twist
 from mbf_abstract.plugins import PluginResult
 
 MAX_OUTCOME = 2**32 - 1  # outcomes are unsigned integers of 32 bits in ``mbf_msgs``
@@ -25,7 +26,11 @@ class PluginNonFinite(PluginFault):
 
 
 def checked_answer(answer: object, expected: type[A], plugin: str, method: str) -> A:
-    """Return a plugin's answer if it is a result that can be passed on; raises PluginFault if it is not."""
+    """Return a plugin's answer if it is a result that can be passed on; raises PluginFault if it is not.
+
+    A wrong type is a fault of the plugin that calling it again cannot change. A command of the right type that is not
+    finite raises PluginNonFinite: the next one may be finite.
+    """
     if not isinstance(answer, expected):
         raise PluginFault(f"plugin {plugin!r} returned {type(answer).__name__} from {method}, not {expected.__name__}")
     outcome: object = answer.outcome
@@ -38,9 +43,11 @@ def checked_answer(answer: object, expected: type[A], plugin: str, method: str) 
     elif not isinstance(message, str):
         problem = f"a message of type {type(message).__name__}, not str"
     else:
-        problem = _wrong_plan(answer)
+        problem = _wrong_plan(answer) or _wrong_command(answer)
     if problem:
         raise PluginFault(f"plugin {plugin!r} returned {problem}, from {method}")
+    if (command := getattr(answer, "command", None)) is not None and (not_finite := command_problem(command)):
+        raise PluginNonFinite(f"plugin {plugin!r}: {not_finite}, from {method}")
     return answer
 
 
@@ -60,3 +67,14 @@ def _wrong_plan(answer: PluginResult) -> str:
     if isinstance(cost, bool) or not isinstance(cost, numbers.Real):
         return f"a cost of type {type(cost).__name__}, not a number"
     return "a cost of nan, which is no number" if math.isnan(cost) else ""
+
+
+def _wrong_command(answer: PluginResult) -> str:
+    """What is wrong with the types of a controller's answer; empty if nothing is."""
+    command: object = getattr(answer, "command", None)
+    hindered_by: object = getattr(answer, "hindered_by", "")
+    if command is not None and type(command) not in (Twist, AckermannCommand):  # nor a subclass, see command_problem
+        return f"a command of type {type(command).__name__}, not Twist or AckermannCommand"
+    if not isinstance(hindered_by, str):
+        return f"a hindered_by of type {type(hindered_by).__name__}, not str"
+    return ""

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from mbf_abstract.drive.commands import require_command
 from mbf_abstract.drive.velocity_gate import Lease
 from mbf_abstract.execution.plugin_answer import PluginFault
 from mbf_abstract.execution.plugin_run import PluginRun
@@ -37,7 +38,8 @@ class GatedMotion:
         return self._runtime.robot.velocity()
 
     def send(self, command: Command) -> bool:
-        """Send one command; False if another owner drives, the goal is paused or is to end."""
+        """Send one command; False if another owner drives, the goal is paused or is to end. TypeError if it is none."""
+        require_command(command)
         if self._run.handle.paused:
             return False
         with self._condition:

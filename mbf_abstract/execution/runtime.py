@@ -13,7 +13,7 @@ from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.drive.velocity_gate import VelocityGate
 from mbf_abstract.event_bus import EventBus
 from mbf_abstract.execution.supervisor import Supervisor
-from mbf_abstract.geometry import AckermannCommand, Pose, Twist
+from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.callbacks import CallbackThread
 from mbf_abstract.maps.avoided_places import AvoidedPlace
@@ -38,6 +38,9 @@ class MapHooks(Protocol):
 
     def floors_taken(self) -> int:
         """How many floors the map has taken up at run time; a plan of before is one on another floor."""
+
+    def path_problem(self, path: Path) -> str:
+        """Why the path of a planner, in the global frame, leads off the map; empty if it does not, or nobody knows."""
 
     def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
         """The answer of a controller with a command by which the robot touches nothing that moves."""

@@ -2,8 +2,8 @@
 
 Use one where the exact pose does not matter ("into the kitchen", "to one of the three charging stations"): the
 planner is asked for a path to every member, the cheapest wins, and the robot stops as soon as it is inside. Do not use
-a large area where one pose would do: each member costs one call of the planner. Areas are given in the server's global
-frame.
+a large area where one pose would do: each member costs one call of the planner. Areas are given in any frame that the
+server knows, and stay where they are in the global frame when the goal begins.
 """
 
 from __future__ import annotations

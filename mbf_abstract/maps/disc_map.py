@@ -9,17 +9,28 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import replace
+from numbers import Real
 
 import numpy as np
 
+from mbf_abstract.config.findings import describe_value
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.failures import obstacle_text
 from mbf_abstract.maps.navigation_map import NavigationMap, PlaceCheck
 from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.parameters import ParameterError
 
 STRIDE = 0.05
 """Distance [m] between two checked places of a motion."""
+
+
+def disc_radius(footprint: object) -> float:
+    """Radius [m] that stands for an outline in ``set_footprint`` of a map for a disc; ParameterError if it is none."""
+    if isinstance(footprint, bool) or not isinstance(footprint, Real):
+        text = "footprint: expected a radius in m, because this map treats the robot as a disc"
+        raise ParameterError(f"{text}, got {describe_value(footprint)}")
+    return float(footprint)
 
 
 class DiscMap(NavigationMap):

@@ -15,7 +15,7 @@ from typing import Any
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.maps.avoided_places import AvoidedPlace
-from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.contact import SAME_STOREY, RobotBox
 from mbf_abstract.maps.tracking.objects import TrackedObject
@@ -104,6 +104,14 @@ class NavigationMap(ABC):
     @abstractmethod
     def point_check(self) -> PlaceCheck:
         """Return a function that gives state and cost of points, on the present map."""
+
+    def first_outside(self, positions: FloatArray) -> int:
+        """Index of the first of the positions (n, 3) [m] of a path that is not on the map; -1 if all are, or may be.
+
+        How far the two ends are above or below the ground does not matter: they are what the path was asked for.
+        """
+        check, there = self.point_check(), (Pose(tuple(xyz), frame_id=self.frame_id) for xyz in positions.tolist())
+        return next((index for index, pose in enumerate(there) if check(pose).state is CellState.OUTSIDE), -1)
 
     @abstractmethod
     def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:

@@ -140,7 +140,7 @@ class ServedMap(Generic[Map]):
 
     def set_parameters(self, changes: Mapping[str, Any]) -> None:
         """Change parameters of the map, all or none; raises ValueError where a value is not legal or cannot change."""
-        old, new = self.parameters, with_changes(self.parameters, changes)
+        old, new = self.parameters, with_changes(self.parameters, changes, where=(self.name,))
         try:
             self.map.take_parameters(new)
         except BaseException:
@@ -159,7 +159,8 @@ class ServedMap(Generic[Map]):
         ValueError
             A value is not legal or cannot change, or the layer does not take it.
         """
-        self.map.set_layer_parameters(layer, with_changes(self.map.usual_parameters(layer), changes))
+        new = with_changes(self.map.usual_parameters(layer), changes, where=(self.name, layer))
+        self.map.set_layer_parameters(layer, new)
         self._report(f"{self.name}.{layer}", changes)
 
     def _report(self, what: str, changes: Mapping[str, Any]) -> None:

@@ -142,6 +142,10 @@ class MapInterface(PluginHost):
         """Why the map must not be driven on right now; empty = it is current."""
         return ""
 
+    def path_problem(self, path: Path) -> str:
+        """Why the path of a planner, in the global frame, leads off the map; empty if it does not, or nobody knows."""
+        return ""
+
     def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
         """The answer of a controller with a command by which the robot touches nothing that moves; as it is here."""
         return answer

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Any
 
 from mbf_abstract.config.configuration import Config
-from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.avoided_places import AvoidedPlace
@@ -119,6 +119,16 @@ class MapServer(AbstractNavigationServer):
         reason: str = served.map.stale_reason(self.runtime.clock.now())
         return reason
 
+    def path_problem(self, path: Path) -> str:
+        """Which pose of a path is not on the map that plans are made on; empty if all are, or that is not known."""
+        navigation_map = next(iter(self.served.values())).map
+        with suppress(TransformError):
+            there = self.runtime.transforms.transform_path(path, navigation_map.frame_id)
+            if (index := navigation_map.first_outside(there.positions)) >= 0:
+                x, y, z = path.positions[index].tolist()
+                return f"pose {index} of the path ({x:.2f}, {y:.2f}, {z:.2f}) is outside the map"
+        return ""
+
     @property
     def robot_radius(self) -> float:
         """That of the outline on the map that the robot drives on."""
@@ -182,8 +192,8 @@ class MapServer(AbstractNavigationServer):
         ServerError
             There is no such layer, or several maps have it.
         ValueError
-            A value is not legal (pydantic's ValidationError is one), the parameter is read once only, or the layer does
-            not take it. Nothing is changed.
+            A value is not legal, the parameter is read once only (a ParameterError), or the layer does not take it.
+            Nothing is changed.
         """
         served, name = self._layer(layer)
         served.set_layer_parameters(name, changes)

@@ -112,8 +112,8 @@ class AbstractNavigationServer(MapInterface):
 
         Raises
         ------
-        ValueError
-            A value is not legal (pydantic's ValidationError is one), or a parameter is read once, at the start.
+        ParameterError
+            A value is not legal, or a parameter is read once, at the start. A ValueError.
         """
         base = self.config.parameters if changes.pop("restore_defaults", False) else self.runtime.parameters
         self.runtime.parameters = with_changes(base, changes, READ_ONCE)

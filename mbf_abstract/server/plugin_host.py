@@ -21,7 +21,7 @@ from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.runtime import Runtime
-from mbf_abstract.parameters import with_changes
+from mbf_abstract.parameters import checked_parameters, with_changes
 from mbf_abstract.plugins import Plugin, PluginContext, PluginKind
 from mbf_abstract.server.plugin_table import PluginTable
 
@@ -82,13 +82,13 @@ class PluginHost(ABC):
         ------
         PluginError
             The type is unknown or is no plugin of this kind.
-        pydantic.ValidationError
+        ParameterError
             A parameter is not legal.
         ServerError
             The name is taken, or the constructor raised.
         """
         plugin_class = self.plugin_registry().load(kind, type_name)
-        values = plugin_class.Parameters.model_validate(parameters)  # type: ignore[attr-defined]
+        values = checked_parameters(plugin_class.Parameters, parameters, (name,))  # type: ignore[attr-defined]
         self.load_plugin(PluginSpec(kind, name, type_name, plugin_class, values, options or {}))
 
     def reload_plugin(self, kind: PluginKind, name: str) -> None:
@@ -100,7 +100,7 @@ class PluginHost(ABC):
         ------
         PluginError
             The source does not load any more.
-        pydantic.ValidationError
+        ParameterError
             The new class does not take the present parameters.
         ServerError
             No such plugin, a goal is using it, or the new constructor raised.
@@ -109,7 +109,7 @@ class PluginHost(ABC):
         plugin_class = self.plugin_registry().reload(kind, old.spec.type_name)
         with self._in_own_use(old, "a reload"):  # not the parameters of a goal
             present = old.instance.parameters.model_dump()
-        values = plugin_class.Parameters.model_validate(present)  # type: ignore[attr-defined]
+        values = checked_parameters(plugin_class.Parameters, present, (name,))  # type: ignore[attr-defined]
         try:
             new = self._construct(replace(old.spec, plugin_class=plugin_class, parameters=values))
         except (Exception, SystemExit) as error:
@@ -170,14 +170,13 @@ class PluginHost(ABC):
         ------
         ServerError
             No such plugin, or it is in use.
-        ValueError
-            A value is not legal (pydantic's ValidationError is one), or the parameter is read once only; nothing is
-            changed.
+        ParameterError
+            A value is not legal, or the parameter is read once only; nothing is changed. A ValueError.
         """
         plugin = self._loaded(kind, name)
         instance = plugin.instance
         with self._in_own_use(plugin, "a change of its parameters"):
-            old, new = instance.parameters, with_changes(instance.parameters, changes)
+            old, new = instance.parameters, with_changes(instance.parameters, changes, where=(name,))
             try:
                 instance.parameters = new
                 instance.parameters_changed()

@@ -80,7 +80,7 @@ class Footprint:
             if len(point) != 2:
                 raise ValueError(f"point {i} of the footprint needs two numbers, got {list(point)}")
         if len(points) < 3:
-            raise ValueError(f"a footprint needs at least 3 points, got {len(points)}")
+            raise ValueError(f"expected a footprint of at least 3 points, got {len(points)}")
         footprint = cls(points)
         if problem := outline_problem(footprint.vertices):
             raise ValueError(problem)

@@ -9,6 +9,8 @@ import math
 from abc import abstractmethod
 from dataclasses import replace
 
+import numpy as np
+
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.navigation_map import PlaceCheck
@@ -35,6 +37,7 @@ class SnapshotAnswers(LayeredMap):
     footprint: Footprint
     unpadded_footprint: Footprint
     knows_outline = True
+    rolling_window: bool
     same_storey = math.inf
 
     @abstractmethod
@@ -65,6 +68,11 @@ class SnapshotAnswers(LayeredMap):
         """State and cost of the cells of points."""
         costmap = self.snapshot()
         return lambda pose: pose_checks.check_point(costmap, pose.x, pose.y)
+
+    def first_outside(self, positions: FloatArray) -> int:
+        """The first position off the grid; not asked of a window, which may have moved since the path was planned."""
+        outside = ~self.snapshot().world_to_cells(positions)[1]
+        return -1 if self.rolling_window or not outside.any() else int(np.argmax(outside))
 
     def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
         """State and summed cost of the outline, see ``pose_checks.pose_check``."""

@@ -8,9 +8,11 @@ import numpy as np
 from pydantic import field_validator
 
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.maps.disc_map import disc_radius
 from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.tracking.contact import RobotBox
-from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.parameters import ParameterError, ParameterModel, parameter
+from mbf_mesh_nav.map.layer import LayerParameters
 from mbf_mesh_nav.mesh.motion_check import UNKNOWN_RADIUS
 
 Corners = tuple[tuple[float, float], ...]
@@ -40,10 +42,16 @@ class OutlineParameters(ParameterModel):
 
 
 def changes_of_radius(footprint: object) -> dict[str, Any]:
-    """Changes of these parameters for a disc of a radius [m]; ValueError for anything but a number."""
-    if not isinstance(footprint, int | float):
-        raise ValueError(f"a mesh map treats the robot as a disc: expected a radius [m], not {footprint!r}")
-    return {"inscribed_radius": footprint, "footprint": ()}
+    """Changes of these parameters for a disc of a radius [m]; ParameterError for anything but a number."""
+    return {"inscribed_radius": disc_radius(footprint), "footprint": ()}
+
+
+def _fitted(layer: str, parameters: LayerParameters, old: float, new: float) -> LayerParameters:
+    """Parameters of a layer for another inscribed radius [m]; the error of one that cannot have it names the layer."""
+    try:
+        return parameters.for_radius(old, new)
+    except ParameterError as error:
+        raise ParameterError(f"{layer}.{error}") from None
 
 
 class OutlinedMap(LayeredMap):
@@ -69,7 +77,7 @@ class OutlinedMap(LayeredMap):
         if radius in (0.0, old):
             return
         usual = {name: self.usual_parameters(name) for name in self.layers}
-        fitted = {name: one.for_radius(old, radius) for name, one in usual.items()}
+        fitted = {name: _fitted(name, one, old, radius) for name, one in usual.items()}
         changed: list[str] = []
         try:
             for name in (name for name in usual if fitted[name] is not usual[name]):

@@ -15,9 +15,11 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
 from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.map.places import SURFACE_DISTANCE as OF_PLACES
 from mbf_mesh_nav.map.places import MeshPlaces
 from mbf_mesh_nav.map.robot_outline import OutlinedMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
+from mbf_mesh_nav.mesh.borders import beyond_border
 from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
 from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE, UNKNOWN_RADIUS, forbidden_ahead, nearest_of
 from mbf_mesh_nav.mesh.topology import MeshTopology
@@ -102,6 +104,13 @@ class SnapshotAnswers(OutlinedMap):
     def point_check(self) -> PlaceCheck:
         """State and interpolated cost of the surface at points."""
         return self.places().check_point
+
+    def first_outside(self, positions: FloatArray) -> int:
+        """The first position past a border, or, the ends apart, farther above or below the surface than places are."""
+        location = self.locate(positions)
+        outside = beyond_border(self.topology, positions, location)
+        outside[1:-1] |= location.distances[1:-1] > OF_PLACES
+        return int(np.argmax(outside)) if outside.any() else -1
 
     def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
         """State and summed cost below the robot's disc."""

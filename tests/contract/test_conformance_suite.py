@@ -104,8 +104,17 @@ def keeps_the_radius_of_its_layers(server):
     server.set_footprint = lambda footprint: None
 
 
+def believes_its_planners(server):
+    server.path_problem = lambda path: ""
+
+
 FAULTS = {
-    keeps_the_radius_of_its_layers: {"a_robot_that_grows_no_longer_fits", "a_bad_change_changes_nothing"},
+    keeps_the_radius_of_its_layers: {
+        "a_robot_that_grows_no_longer_fits",
+        "a_bad_change_changes_nothing",
+        "a_bad_change_is_named",
+    },
+    believes_its_planners: {"a_planned_path_off_the_map_is_refused"},
     ignores_silence: {
         "a_silent_sensor_holds_the_robot_while_it_drives",
         "a_sensor_that_stays_silent_ends_the_path_with_map_error",

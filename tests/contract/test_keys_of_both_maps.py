@@ -63,7 +63,7 @@ def test_how_far_points_count_has_one_name(tmp_path, layer, old, new):
 def test_an_earlier_key_is_refused_with_its_new_name_at_run_time_too(backends, backend, controller, old, new):
     with site(backends[backend]) as made:
         change, name = made.server.set_plugin_parameters, made.server.plugins.names(PluginKind.CONTROLLER)[0]
-        with pytest.raises(ValueError, match=f"{old}: expected a known parameter, it is called '{new}' now"):
+        with pytest.raises(ValueError, match=rf"{old}: expected a known key, got '{old}' \(it is called '{new}' now\)"):
             change(PluginKind.CONTROLLER, name, **{old: 1.0})
         with pytest.raises(ValueError, match="did you mean 'max_vel_x'"):
             change(PluginKind.CONTROLLER, name, max_vel=1.0)

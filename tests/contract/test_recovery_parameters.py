@@ -40,9 +40,9 @@ def test_the_usual_parameters_come_back_after_a_failure_too(made):
 @pytest.mark.parametrize(
     ("parameters", "text"),
     [
-        ({"angle": 100.0}, "less than or equal to 31.5"),
-        ({"angel": 1.0}, "angel: expected a known parameter, did you mean 'angle'?"),
-        ({"angle": math.nan}, "'rotate': angle: input should be a finite number, got nan"),
+        ({"angle": 100.0}, "rotate': angle: expected a number >= -31.5 and <= 31.5 rad, got 100.0"),
+        ({"angel": 1.0}, "angel: expected a known key, got 'angel' (did you mean 'angle'?)"),
+        ({"angle": math.nan}, "'rotate': angle: expected a finite number >= -31.5 and <= 31.5 rad, got nan"),
     ],
 )
 def test_parameters_that_are_not_legal_are_refused_before_anything_moves(made, parameters, text):

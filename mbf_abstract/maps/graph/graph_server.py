@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from mbf_abstract.config.configuration import Config
+from mbf_abstract.maps.disc_map import disc_radius
 from mbf_abstract.maps.graph.graph_map import GraphMap
 from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.served_map import ServedMap
@@ -42,9 +43,7 @@ class GraphMapServer(MapServer):
 
     def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
         """The radius of a round robot."""
-        if not isinstance(footprint, int | float):
-            raise ValueError(f"this map treats the robot as a disc: expected a radius [m], not {footprint!r}")
-        return {"robot_radius": footprint}
+        return {"robot_radius": disc_radius(footprint)}
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add the map."""

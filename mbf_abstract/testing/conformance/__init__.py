@@ -18,6 +18,7 @@ from types import ModuleType
 
 from mbf_abstract.testing.conformance import (
     asking,
+    bad_plugins,
     canceling,
     changing,
     driving,
@@ -39,6 +40,7 @@ _PARTS: tuple[ModuleType, ...] = (
     planning,
     driving,
     unreachable_paths,
+    bad_plugins,
     touching,
     canceling,
     sensing,

@@ -69,6 +69,44 @@ def a_bad_change_changes_nothing(site: Site) -> None:
     site.expect_outcome(site.navigator.exe_path(site.path((2.0, 4.0), (3.0, 4.0))), ExePathOutcome.SUCCESS)
 
 
+@situation()
+def a_bad_change_is_named(site: Site) -> None:
+    """The error of a value that is not legal names the key, what was expected (unit, range) and what came."""
+    server, radius = site.server, site.server.set_footprint
+    places = [f"{served.name}.{layer}" for served in server.served.values() for layer in served.map.layers]
+    for what, change, texts in (
+        (
+            "two wrong parameters",
+            lambda: server.set_parameters(controller_frequency=-1.0, planner_patience="soon"),
+            (
+                "controller_frequency: expected a number > 0 and <= 100 Hz, got -1.0",
+                "planner_patience: expected a number >= 0 and <= 100 s, got 'soon'",
+            ),
+        ),
+        (
+            "an unknown parameter",
+            lambda: server.set_parameters(controler_frequency=5.0),
+            ("controler_frequency: expected a known key, got 'controler_frequency' (did you mean 'controller_freq",),
+        ),
+        (
+            "a plugin's parameter",
+            lambda: server.set_plugin_parameters(PluginKind.RECOVERY, "wait", duration=-1.0),
+            ("wait.duration: expected a number >= 0 and <= 600 s, got -1.0",),
+        ),
+        (
+            "a layer's parameter",
+            lambda: server.set_layer_parameters(places[0], enabled="perhaps"),
+            (f"{places[0]}.enabled: expected true or false, got 'perhaps'",),
+        ),
+        ("a radius below 0", lambda: radius(-1.0), ("radius: expected a number >", " 0 m, got -1.0")),
+        ("a radius of NaN", lambda: radius(float("nan")), ("radius: expected a finite number", " m, got nan")),
+        ("a flag for a radius", lambda: radius(True), ("footprint: expected ", "radius in m", "got True")),
+        ("a text for corners", lambda: radius("round"), ("footprint: expected ", "got 'round'")),
+        ("no footprint", lambda: radius(None), ("footprint: expected ", "radius in m", "got nothing")),
+    ):
+        site.expect_raises(ValueError, change, what, *texts)
+
+
 @situation(controller_patience=30.0)
 def a_layer_is_switched_off_while_driving(site: Site) -> None:
     """A layer that is switched off while the robot stands before its obstacle lets it drive on, and comes back."""

@@ -162,6 +162,18 @@ def any_member_of_a_goal_area_will_do(site: Site) -> None:
 
 
 @situation()
+def a_goal_area_of_another_frame_is_transformed(site: Site) -> None:
+    """A goal area is given in any known frame, as a pose is; in an unknown one it ends with TF_ERROR and its name."""
+    goal = somewhere(6.0, 4.0)
+    area = DiscArea(T_map_dock.inverse().apply_to_pose(goal), 1.0)
+    site.expect_outcome(site.navigator.get_path(goal, goal_area=area), GetPathOutcome.SUCCESS)
+    site.expect_outcome(site.navigator.go_to(goal, goal_area=area), GetPathOutcome.SUCCESS)
+    site.expect_near(6.0, 4.0, 1.0, "the area is around (6, 4)")
+    lost = site.navigator.get_path(goal, goal_area=DiscArea(somewhere(6.0, 4.0, "nowhere"), 1.0))
+    site.expect_outcome(lost, GetPathOutcome.TF_ERROR, "nowhere")
+
+
+@situation()
 def a_goal_in_another_frame_is_transformed(site: Site) -> None:
     """A goal in a known frame is planned for in the map, one in an unknown frame ends with TF_ERROR."""
     there = T_map_dock.apply_to_pose(somewhere(1.0, -2.0, "dock"))

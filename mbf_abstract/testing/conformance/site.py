@@ -70,12 +70,15 @@ class Site:
         for text in texts:
             self.expect(text in result.message, f"expected a message that contains {text!r}, got {got}")
 
-    def expect_raises(self, errors: type[Exception], call: Callable[[], object], what: str) -> None:
-        """Expect an exception."""
+    def expect_raises(self, errors: type[Exception], call: Callable[[], object], what: str, *texts: str) -> None:
+        """Expect an exception whose text is one line and contains each of ``texts``."""
         try:
             answer = call()
         except errors as error:
             self.expect(bool(str(error)), f"{what}: {type(error).__name__} without a text")
+            self.expect("\n" not in str(error), f"{what}: expected a text of one line, got {str(error)!r}")
+            for text in texts:
+                self.expect(text in str(error), f"{what}: expected a text that contains {text!r}, got {str(error)!r}")
         except Exception as error:
             self.expect(False, f"{what}: expected {errors.__name__}, got {type(error).__name__}: {error}")
         else:

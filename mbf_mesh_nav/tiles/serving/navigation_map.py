@@ -15,10 +15,11 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.view import GridView
-from mbf_mesh_nav.arrays import FlagArray
+from mbf_mesh_nav.arrays import FlagArray, FloatArray
 from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.borders import BORDER_SLACK
 from mbf_mesh_nav.tiles.portals import NOT_CANCELLED
 from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED, SensedCosts
 from mbf_mesh_nav.tiles.serving.moment import Moment
@@ -136,6 +137,16 @@ class TiledNavigationMap(TileQuestions):
             return []
         text = f"the tiles were built for a robot with a radius of {built:g} m, this one has {radius:g} m: beside their"
         return [f"{text} obstacles, ground that its body touches may count as free; build them for this robot"]
+
+    def first_outside(self, positions: FloatArray) -> int:
+        """The first position with no tile above or below it; a hole in a tile is not looked for."""
+        plan = positions[:, :2]
+        outside = np.ones(len(plan), dtype=np.bool_)
+        for key in self.tiled.index.tiles_in((*plan.min(axis=0), -np.inf, *plan.max(axis=0), np.inf)):
+            box = self.tiled.index.entries[key].box
+            low, high = np.array(box[:2]) - BORDER_SLACK, np.array(box[3:5]) + BORDER_SLACK
+            outside &= ((plan < low) | (plan > high)).any(axis=1)
+        return int(np.argmax(outside)) if outside.any() else -1
 
     def moment(self) -> Moment:
         """The map as it is now."""

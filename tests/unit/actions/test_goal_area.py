@@ -1,12 +1,15 @@
 """Goal areas: the cheapest member is planned to, the robot stops as soon as it is inside."""
 
+import math
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry import Pose, Twist, quaternion_from_yaw
+from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.goals.goal_area import DiscArea, PolygonArea, PoseSetArea
-from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanResult
@@ -78,17 +81,50 @@ def test_exe_path_stops_where_the_path_enters_the_area(make_session):
     assert 2.0 <= session.robot.pose.x < 2.1
 
 
-@pytest.mark.parametrize("kind", [GetPathGoal, MoveBaseGoal])
-def test_an_area_in_another_frame_is_rejected(make_session, kind):
-    handle = send(make_session(), DiscArea(Pose.planar(1, 0, frame_id="odom"), 1.0), kind)
-    assert handle.status is GoalStatus.REJECTED
-    assert "must be given in the global frame 'map', got 'odom'" in handle.result.message
+def elsewhere(area, session):
+    """The same area in the frame ``dock``, which is turned and shifted against ``map``."""
+    dock = Transform((4.0, -1.0, 0.0), quaternion_from_yaw(math.pi / 2.0), "map", "dock", static=True)
+    session.transforms.set(dock)
+    there = dock.inverse()
+    if isinstance(area, PolygonArea):
+        return PolygonArea(tuple(map(tuple, there.apply(area.corners).tolist())), "dock")
+    if isinstance(area, DiscArea):
+        return DiscArea(there.apply_to_pose(area.center), area.radius)
+    return replace(area, poses=tuple(map(there.apply_to_pose, area.poses)))
 
 
-def test_an_exe_path_area_in_another_frame_is_rejected(make_session):
+@pytest.mark.parametrize("area", [DISC, SQUARE, STATIONS])
+def test_an_area_in_another_frame_is_that_area(make_session, area):
     session = make_session()
-    area = DiscArea(Pose.planar(1, 0, frame_id="odom"), 1.0)
-    assert session.navigator.send(ExePathGoal(session.path_to(1.0), goal_area=area)).status is GoalStatus.REJECTED
+    there = elsewhere(area, session)
+    assert there.frame_id == "dock"
+    plan = send(session, there).wait()
+    assert plan.success and area.contains(plan.path[-1])
+    assert send(session, there, MoveBaseGoal).wait().success and area.contains(session.robot.pose)
+
+
+def test_a_path_ends_in_an_area_of_another_frame(make_session):
+    session = make_session()
+    goal = ExePathGoal(session.path_to(9.0), goal_area=elsewhere(DISC, session))
+    assert session.navigator.send(goal).wait().success
+    assert DISC.contains(session.robot.pose) and session.robot.pose.x < 9.0 - 2.0
+
+
+def test_an_area_stays_where_it_was_when_the_goal_began(make_session):
+    session = make_session()
+    area = elsewhere(DISC, session)
+    handle = send(session, area, MoveBaseGoal)
+    session.clock.sleep(0.5)
+    session.transforms.set(Transform((50.0, 0.0, 0.0), parent="map", child="dock", static=True))
+    assert handle.wait().success and DISC.contains(session.robot.pose)
+
+
+@pytest.mark.parametrize("kind", [GetPathGoal, MoveBaseGoal])
+def test_an_area_in_an_unknown_frame_is_a_tf_error(make_session, kind):
+    session, area = make_session(), DiscArea(Pose.planar(1, 0, frame_id="nowhere"), 1.0)
+    followed = session.navigator.send(ExePathGoal(session.path_to(1.0), goal_area=area)).wait()
+    for result in (send(session, area, kind).wait(), followed):
+        assert result.outcome_name == "TF_ERROR" and "nowhere" in result.message
 
 
 @pytest.mark.parametrize(

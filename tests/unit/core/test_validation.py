@@ -107,7 +107,7 @@ def test_nested_keys_are_named_with_their_line():
 
 def test_a_bad_item_of_a_list_is_described_by_its_field():
     _, findings = check({"corner": [1, "x"]})
-    assert findings[0].text == "/folder/c.yaml:4: block.corner[1]: expected a number m, got 'x'"
+    assert findings[0].text == "/folder/c.yaml:4: block.corner[1]: expected a number in m, got 'x'"
 
 
 def test_a_missing_value_is_a_finding_at_the_block():

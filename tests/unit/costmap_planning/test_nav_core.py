@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.geometry import Path as RobotPath
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.goal_types import MoveBaseGoal
@@ -60,8 +61,10 @@ def test_an_old_controller_drives_a_plan_to_its_end(navigator):
 
 
 def test_an_old_controller_without_a_command_has_failed(navigator):
-    far = navigator.get_path(Pose.planar(200.0, 0.0)).path
-    driven = navigator.exe_path(far)
+    goal = Pose.planar(200.0, 0.0)
+    planned = navigator.get_path(goal)
+    assert planned.outcome == GetPathOutcome.INTERNAL_ERROR and "is outside the map" in planned.message
+    driven = navigator.exe_path(RobotPath.from_poses([Pose.planar(0.0, 0.0), goal]))
     assert (driven.outcome, driven.message) == (ExePathOutcome.FAILURE, "Controller failed")
 
 
