@@ -34,7 +34,7 @@ def arc_poses(
 
     Exact integration of a constant twist (vx, vy [m/s], wz [rad/s]).
     """
-    return poses_on_arc(pose, vx, vy, wz, np.append(np.arange(step, duration, step), duration))
+    return poses_on_arc(pose, vx, vy, wz, np.concatenate((np.arange(step, duration, step), (duration,))))
 
 
 def poses_on_arc(pose: tuple[float, float, float], vx: float, vy: float, wz: float, times: FloatArray) -> FloatArray:

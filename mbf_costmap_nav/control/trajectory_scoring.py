@@ -73,7 +73,7 @@ def _path_ahead(cycle: ControlCycle, length: float) -> tuple[NDArray[np.float64]
     """
     tracker = cycle.tracker
     on_path = min(length, tracker.to_cusp)
-    along = tracker.progress + np.append(np.arange(0.0, on_path, PATH_SPACING), on_path)
+    along = tracker.progress + np.concatenate((np.arange(0.0, on_path, PATH_SPACING), (on_path,)))
     points = tracker.points_at(along)
     free = _free_points(cycle, points)
     if tracker.on_last_section or on_path == length:

@@ -140,27 +140,33 @@ class DWAController(SamplingFollower):
             sideways = min(p.max_vel_y, cycle.speed_limit)
             vy = sample_window(now.vy, -sideways, sideways, p.acc_lim_y * p.window_time, p.vy_samples)
         wz = sample_window(now.wz, -p.max_vel_theta, p.max_vel_theta, p.acc_lim_theta * p.window_time, p.vtheta_samples)
-        window = np.stack(np.meshgrid(vx, vy, wz, indexing="ij"), axis=-1).reshape(-1, 3)
-        return slowed_down(window, cycle.speed_limit)
+        window = np.empty((len(vx), len(vy), len(wz), 3))
+        window[..., 0], window[..., 1], window[..., 2] = vx[:, None, None], vy[:, None], wz
+        return slowed_down(window.reshape(-1, 3), cycle.speed_limit)
 
 
 def slowed_down(velocities: FloatArray, top_speed: float) -> FloatArray:
     """Velocities (n, 3) whose (vx, vy) is shortened to ``top_speed`` [m/s] where it is longer."""
     speeds = np.hypot(velocities[:, 0], velocities[:, 1])
+    if speeds.max() <= top_speed:
+        return velocities
     shares = np.divide(top_speed, speeds, out=np.ones_like(speeds), where=speeds > top_speed)
     return np.asarray(velocities * np.column_stack([shares, shares, np.ones_like(shares)]))
 
 
 def sample_velocities(low: float, high: float, count: int) -> FloatArray:
     """At least two evenly spaced velocities from ``low`` to ``high``, and zero if it lies strictly between them."""
-    samples = np.linspace(low, high, max(2, count))
+    if high <= low:
+        return np.array([low])
+    last = max(2, count) - 1
+    samples = np.arange(last + 1.0) * ((high - low) / last) + low  # numpy.linspace, whose checks take most of its time
+    samples[last] = high
     if low < 0.0 < high and not (samples == 0.0).any():
         samples = np.sort(np.append(samples, 0.0))
-    return samples if high > low else samples[:1]
+    return samples
 
 
 def sample_window(current: float, low: float, high: float, change: float, count: int) -> FloatArray:
     """Velocities within ``change`` of the current one and within the limits; a robot beyond a limit comes back."""
-    return sample_velocities(
-        float(np.clip(current - change, low, high)), float(np.clip(current + change, low, high)), count
-    )
+    slowest, fastest = (min(max(velocity, low), high) for velocity in (current - change, current + change))
+    return sample_velocities(slowest, fastest, count)

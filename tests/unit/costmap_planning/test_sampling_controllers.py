@@ -155,6 +155,13 @@ def test_velocity_samples(low, high, count, expected):
     assert sample_velocities(low, high, count).tolist() == pytest.approx(expected)
 
 
+@given(low=st.floats(-20.0, 20.0), width=st.floats(1e-6, 20.0), count=st.integers(2, 60))
+def test_velocity_samples_are_spaced_as_numpy_spaces_them(low, width, count):
+    evenly = np.linspace(low, low + width, count)
+    samples = sample_velocities(low, low + width, count)
+    assert set(evenly.tolist()) <= set(samples.tolist()) <= set(evenly.tolist()) | {0.0}
+
+
 def test_f079_a_tiny_asymmetry_adds_zero():
     assert len(sample_velocities(-10.00001, 10, 3)) == 4
 
