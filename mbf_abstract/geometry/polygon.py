@@ -17,8 +17,9 @@ def inside_polygon(points: NDArray[np.float64], corners: NDArray[np.float64]) ->
     """
     x, y = points[:, 0], points[:, 1]
     inside = np.zeros(len(points), dtype=np.bool_)
-    for (x1, y1), (x2, y2) in zip(corners[:, :2], np.roll(corners[:, :2], -1, axis=0), strict=True):
-        spans = (y1 > y) != (y2 > y)
-        rise = y2 - y1 if y2 != y1 else 1.0
-        inside ^= spans & (x < x1 + (y - y1) * (x2 - x1) / rise)
+    with np.errstate(over="ignore"):  # of an edge that rises by next to nothing, between whose ends nothing lies
+        for (x1, y1), (x2, y2) in zip(corners[:, :2], np.roll(corners[:, :2], -1, axis=0), strict=True):
+            spans = (y1 > y) != (y2 > y)
+            rise = y2 - y1 if y2 != y1 else 1.0
+            inside ^= spans & (x < x1 + (y - y1) * (x2 - x1) / rise)
     return inside

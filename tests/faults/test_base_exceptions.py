@@ -11,7 +11,7 @@ from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcom
 from mbf_abstract.testing.faulty import Hang, drive
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import ThreadDetached, WallClock
-from tests.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from promises import assert_ended_once, assert_next_goals_work, assert_stops
 
 ERRORS = [SystemExit(3), asyncio.CancelledError("no"), KeyboardInterrupt(), GeneratorExit(), ThreadDetached("liar")]
 

@@ -12,7 +12,7 @@ from mbf_abstract.testing.faulty import obedient, slow
 from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.sim_clock import SimClock
-from tests.promises import assert_ended_once, assert_next_goals_work
+from promises import assert_ended_once, assert_next_goals_work
 
 GOAL = Pose.planar(3.0, 0.0)
 

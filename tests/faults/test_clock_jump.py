@@ -5,7 +5,7 @@ from mbf_abstract.testing.faulty import drive
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
-from tests.promises import assert_ended_once, assert_stops
+from promises import assert_ended_once, assert_stops
 
 
 def test_the_clocks_never_run_backwards():

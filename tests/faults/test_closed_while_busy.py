@@ -12,7 +12,7 @@ from mbf_abstract.testing.faulty import BusyHang, Hang
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
-from tests.promises import assert_ended_once
+from promises import assert_ended_once
 
 GOALS = {
     "planner": lambda session: GetPathGoal(Pose.planar(3.0, 0.0)),

@@ -14,7 +14,7 @@ from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
-from tests.promises import assert_ended_once, assert_stops
+from promises import assert_ended_once, assert_stops
 
 assert kernel_cache  # a map backend imports it with its kernels
 

@@ -6,7 +6,7 @@ from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.testing.faulty import BusyHang, Hang, drive
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from promises import assert_ended_once, assert_next_goals_work, assert_stops
 
 
 def test_the_watchdog_stops_the_robot_and_the_goal_ends_after_patience_and_grace():

@@ -8,7 +8,7 @@ from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult
 from mbf_abstract.testing.faulty import drive, nan_command, no_command
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from promises import assert_ended_once, assert_next_goals_work, assert_stops
 
 INFINITE = [lambda request: ControlResult(0, "go", Twist.planar(wz=float("inf")))]
 

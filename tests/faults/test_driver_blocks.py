@@ -11,7 +11,7 @@ from mbf_abstract.plugins import RecoveryResult
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
-from tests.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from promises import assert_ended_once, assert_next_goals_work, assert_stops
 
 PLACES = {
     "odometry": "the robot's odometry()",

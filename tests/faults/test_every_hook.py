@@ -12,7 +12,7 @@ from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, RecoveryGoal
 from mbf_abstract.plugins import PLUGIN_BASES, PluginKind
 from mbf_abstract.testing.faulty import Hang
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from promises import assert_ended_once, assert_next_goals_work, assert_stops
 
 LIMITS = {"planner_patience": 2.0, "controller_patience": 2.0, "recovery_patience": 2.0, "cancel_grace": 0.5}
 ENDS_WITHIN = 8.0  # s: driving, patience, grace, and a call that is late by LATE

@@ -11,7 +11,7 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.testing.faulty import Hang
 from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_next_goals_work
+from promises import assert_next_goals_work
 
 GOAL = GetPathGoal(Pose.planar(1.0, 0.0))
 

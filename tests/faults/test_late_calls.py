@@ -13,7 +13,7 @@ from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
 from mbf_abstract.testing.scripted_session import SCRIPTED, ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
-from tests.promises import assert_next_goals_work
+from promises import assert_next_goals_work
 
 GOAL = GetPathGoal(Pose.planar(3.0, 0.0))
 

@@ -6,7 +6,7 @@ from mbf_abstract.goals.goal_types import ExePathGoal, RecoveryGoal
 from mbf_abstract.plugins import RecoveryResult
 from mbf_abstract.testing.faulty import drive, slow
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_next_goals_work, assert_stops
+from promises import assert_next_goals_work, assert_stops
 
 
 def test_a_command_computed_during_the_cancel_does_not_reach_the_robot():

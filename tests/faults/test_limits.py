@@ -16,7 +16,7 @@ from mbf_costmap_nav.files.map_description import MapError
 from mbf_costmap_nav.files.map_io import load_image, load_map
 from mbf_mesh_nav.files.mesh_io import read_mesh
 from mbf_mesh_nav.mesh.repair import MeshError
-from tests.promises import assert_ended_once, assert_next_goals_work
+from promises import assert_ended_once, assert_next_goals_work
 
 SMALL = 4_000_000  # bytes; far below every input that is claimed here
 POSES = 100_000

@@ -3,7 +3,7 @@
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_next_goals_work, assert_stops
+from promises import assert_next_goals_work, assert_stops
 
 
 def test_the_robot_holds_and_the_goal_ends_with_map_error_after_patience():

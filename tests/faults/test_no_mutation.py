@@ -24,7 +24,7 @@ from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.plugins import CostmapPlanner
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.plugins import MeshPlanner
-from tests.promises import assert_next_goals_work, assert_stops
+from promises import assert_next_goals_work, assert_stops
 
 CONFIGS = {
     "mesh": """

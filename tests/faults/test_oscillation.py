@@ -5,7 +5,7 @@ from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from mbf_abstract.plugins import ControlResult
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from promises import assert_ended_once, assert_next_goals_work, assert_stops
 
 
 def to_and_fro(request):

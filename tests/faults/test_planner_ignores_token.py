@@ -11,7 +11,7 @@ from mbf_abstract.testing.faulty import BusyHang, Hang, slow
 from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
 from mbf_abstract.testing.scripted_session import SCRIPTED, ScriptedSession
 from mbf_abstract.time.sim_clock import SimClock
-from tests.promises import assert_ended_once, assert_next_goals_work
+from promises import assert_ended_once, assert_next_goals_work
 
 GOAL = GetPathGoal(Pose.planar(3.0, 0.0))
 

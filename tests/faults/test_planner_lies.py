@@ -13,7 +13,7 @@ from mbf_abstract.plugins import PlanResult, RefineResult
 from mbf_abstract.testing import faulty
 from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_ended_once, assert_next_goals_work
+from promises import assert_ended_once, assert_next_goals_work
 
 
 def outcome(code, message="found"):

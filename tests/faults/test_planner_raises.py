@@ -7,7 +7,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_ended_once, assert_next_goals_work
+from promises import assert_ended_once, assert_next_goals_work
 
 
 @pytest.mark.parametrize("error", [RuntimeError("boom"), KeyError("x"), ZeroDivisionError(), RecursionError("deep")])

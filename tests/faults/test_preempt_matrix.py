@@ -9,7 +9,7 @@ from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from mbf_abstract.testing.faulty import slow
 from mbf_abstract.testing.scripted import ScriptedController, straight_plan
 from mbf_abstract.testing.scripted_session import SCRIPTED, ScriptedSession
-from tests.promises import assert_ended_once
+from promises import assert_ended_once
 
 TWO_CONTROLLERS = {**SCRIPTED, "other": ScriptedController}
 

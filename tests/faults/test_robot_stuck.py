@@ -7,7 +7,7 @@ from mbf_abstract.geometry import Twist
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from promises import assert_ended_once, assert_next_goals_work, assert_stops
 
 
 def test_a_stuck_robot_ends_the_goal_with_robot_stuck_and_zero():

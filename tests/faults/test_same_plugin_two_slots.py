@@ -5,7 +5,7 @@ from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.testing.scripted import ScriptedController, straight_plan
 from mbf_abstract.testing.scripted_session import SCRIPTED, ScriptedSession
-from tests.promises import assert_ended_once
+from promises import assert_ended_once
 
 
 class Overlap:

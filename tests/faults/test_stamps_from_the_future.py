@@ -10,7 +10,7 @@ from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from promises import assert_ended_once, assert_next_goals_work, assert_stops
 
 AHEAD = [0.9, 3.0, 1000.0, 1.79e9]  # s; the last is time.time() where the clock began at zero
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_ended_once
+from promises import assert_ended_once
 
 
 def jump(session, x, y):

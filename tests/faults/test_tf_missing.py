@@ -6,7 +6,7 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_ended_once, assert_next_goals_work
+from promises import assert_ended_once, assert_next_goals_work
 
 NOWHERE = Pose.planar(1.0, 0.0, frame_id="nowhere")
 

@@ -5,7 +5,7 @@ from mbf_abstract.execution.controller_state import ControllerState
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from promises import assert_ended_once, assert_next_goals_work, assert_stops
 
 
 def test_the_robot_holds_and_the_goal_ends_with_the_age_after_patience():

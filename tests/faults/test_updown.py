@@ -11,7 +11,7 @@ from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
 from mbf_abstract.testing.faulty import Hang
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from tests.promises import assert_ended_once
+from promises import assert_ended_once
 
 
 def start_plan_and_stop():

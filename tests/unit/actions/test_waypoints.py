@@ -14,7 +14,7 @@ from mbf_abstract.testing.scripted import straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
-from tests.promises import assert_ended_once, assert_next_goals_work
+from promises import assert_ended_once, assert_next_goals_work
 
 NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")
 NEAR = (Pose.planar(0.3, 0.0), Pose.planar(0.6, 0.0), Pose.planar(0.9, 0.0))

@@ -12,7 +12,7 @@ from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.sim_clock import SimClock
-from tests.promises import assert_stops
+from promises import assert_stops
 
 
 @pytest.fixture
