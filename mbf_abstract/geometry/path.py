@@ -16,6 +16,7 @@ from mbf_abstract.geometry.rotations import (
     FloatArray,
     NonFiniteError,
     Quaternion,
+    level_quaternions,
     quaternions_from_axes,
 )
 
@@ -117,8 +118,10 @@ class Path:
         if moving.size:  # a repeated point looks where the next one looks, the last one where the one before looked
             following = np.minimum(np.searchsorted(moving, np.arange(len(points))), moving.size - 1)
             ahead = steps[moving[following]]
-        up = np.tile([0.0, 0.0, 1.0], (len(points), 1)) if normals is None else np.asarray(normals, dtype=float)
-        orientations = quaternions_from_axes(ahead, up) if len(points) else np.zeros((0, 4))
+        if normals is None:
+            orientations = level_quaternions(ahead)
+        else:
+            orientations = quaternions_from_axes(ahead, normals) if len(points) else np.zeros((0, 4))
         if final_orientation is not None and len(points):
             orientations[-1] = final_orientation
         return cls(points, orientations, frame_id, stamp, guidance)

@@ -8,6 +8,7 @@ window ends near the robot.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,9 @@ from mbf_costmap_nav.kernels.map.footprint_cost import collisions, first_collisi
 
 FloatArray = NDArray[np.float64]
 
+OUTLINES_KEPT = 32
+"""Samples of so many outlines are kept: plans and motions ask for those of a few robots again and again."""
+
 
 class FootprintCheck:
     """A footprint as a set of samples.
@@ -28,12 +32,13 @@ class FootprintCheck:
     Attributes
     ----------
     samples : (n, 2) float64
-        Footprint samples in the base frame [m], outline first; the origin alone for a point robot.
+        Footprint samples in the base frame [m], outline first; the origin alone for a point robot. Not to be written
+        to: other checks of this outline have the same array.
     """
 
     def __init__(self, footprint: Footprint, resolution: float) -> None:
         self.footprint = footprint
-        self.samples = footprint_samples(footprint.vertices, resolution)
+        self.samples = _samples(footprint.vertices.tobytes(), resolution)
 
     def cost(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
         """Largest cost under the footprint; -1 if it leaves the map."""
@@ -66,6 +71,12 @@ class FootprintCheck:
         return np.asarray(
             collisions(costmap.cells, costmap.resolution, costmap.origin_x, costmap.origin_y, self.samples, poses)
         )
+
+
+@lru_cache(maxsize=OUTLINES_KEPT)
+def _samples(vertices: bytes, resolution: float) -> FloatArray:
+    """``footprint_samples`` of the bytes of vertices (n, 2) float64; writable, as kernels know one kind of arrays."""
+    return footprint_samples(np.frombuffer(vertices).reshape(-1, 2), resolution)
 
 
 def footprint_samples(vertices: FloatArray, resolution: float) -> FloatArray:

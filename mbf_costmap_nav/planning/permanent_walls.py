@@ -33,7 +33,10 @@ def is_permanently_unreachable(
     from scipy import ndimage  # takes 0.13 s to import, and most plans are found
 
     pieces, _ = ndimage.label(free, EIGHT_NEIGHBOURS)
-    rows, columns = np.nonzero(pieces == pieces[iy, ix])
     goal_x, goal_y = walls.world_to_cell_clamped(goal.x, goal.y)
     reach = tolerance / walls.resolution + 1.0 if tolerance > 0.0 else 0.0
-    return bool(((columns - goal_x) ** 2 + (rows - goal_y) ** 2 > reach * reach).all())
+    near = int(min(reach, max(pieces.shape)))  # the tolerance may be inf
+    left, below = max(goal_x - near, 0), max(goal_y - near, 0)
+    around = pieces[below : goal_y + near + 1, left : goal_x + near + 1]
+    rows, columns = np.nonzero(around == pieces[iy, ix])
+    return bool(((columns + left - goal_x) ** 2 + (rows + below - goal_y) ** 2 > reach * reach).all())

@@ -20,6 +20,7 @@ from mbf_abstract.geometry import (
     quaternions_from_axes,
     rotation_matrix,
 )
+from mbf_abstract.geometry.rotations import level_quaternions
 
 angles = st.floats(-20.0, 20.0)
 coordinates = st.floats(-1e3, 1e3)
@@ -66,6 +67,17 @@ def test_frames_from_axes_have_the_z_axis_and_the_heading_asked_for(seed):
         assert rotation[:, 2] == pytest.approx(z / np.linalg.norm(z), abs=1e-9)
         assert rotation[:, 0] @ x > 0.0
         assert rotation[:, 1] @ x == pytest.approx(0.0, abs=1e-9)
+
+
+def test_level_quaternions_have_the_bytes_of_those_with_z_axes_that_are_up():
+    rng = np.random.default_rng(3)
+    scaled = rng.normal(size=(3000, 3)) * 10.0 ** rng.integers(-12, 4, (3000, 1))
+    flat = rng.normal(size=(3000, 3)) * [1.0, 1.0, 0.0]
+    along_axes = rng.integers(-2, 3, (3000, 3)) * rng.choice([1.0, -1.0], (3000, 3))  # zeros of both signs
+    x_axes = np.concatenate([scaled, flat, along_axes])
+    expected = quaternions_from_axes(x_axes, np.tile([0.0, 0.0, 1.0], (len(x_axes), 1)))
+    assert level_quaternions(x_axes).tobytes() == expected.tobytes()
+    assert level_quaternions(np.zeros((0, 3))).shape == (0, 4)
 
 
 def test_distance_and_angle_between_poses():

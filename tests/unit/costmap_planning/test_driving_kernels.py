@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mbf_costmap_nav.control.sampling_noise import smoothing_matrix
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck, footprint_samples
 from mbf_costmap_nav.kernels.control.critics import (
     alignment,
     furthest_reached,
@@ -175,3 +175,14 @@ def test_the_blended_motion_is_the_mean_by_weight_then_smoothed(samples, tempera
     mean = np.average(velocities.astype(np.float64), axis=2, weights=weights)
     blended = blend(velocities, costs, temperature, smoothing)
     assert blended == pytest.approx(mean @ smoothing.astype(np.float64), abs=1e-5)
+
+
+def test_checks_of_equal_outlines_have_one_array_of_samples():
+    corners = [[0.4, 0.25], [-0.3, 0.25], [-0.3, -0.25], [0.4, -0.25]]
+    one, same, finer, longer = (
+        FootprintCheck(Footprint(np.array(corners) * [factor, 1.0]), resolution).samples
+        for factor, resolution in ((1.0, 0.05), (1.0, 0.05), (1.0, 0.02), (1.1, 0.05))
+    )
+    assert one is same
+    assert len(finer) > len(longer) > len(one)
+    assert np.array_equal(one, footprint_samples(np.array(corners), 0.05))

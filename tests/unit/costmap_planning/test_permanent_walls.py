@@ -2,16 +2,18 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.costmap import INSCRIBED, Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
 from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
+from mbf_costmap_nav.planning.permanent_walls import is_permanently_unreachable
 
 PLANNERS = [AStarPlanner, DijkstraPlanner, ThetaStarPlanner, HybridAStarPlanner]
 OBSTACLES = {"sources": {"scan": {"obstacle_max_range": 20.0}}}
@@ -92,3 +94,24 @@ def test_asking_for_permanent_walls_changes_nothing_of_the_map(rooms):
         costmap.insert_points("scan", [(3.05, 3.05, 0.2)], (1.0, 2.5, 0.2), 1.0)
         costmap.update(Pose.planar(1.0, 2.5), 1.0)
     assert np.array_equal(asked.snapshot().cells, left.snapshot().cells)
+
+
+def separated_by_hand(costmap, start, goal, tolerance):
+    """The twin: every cell of the start's piece of free space is looked at."""
+    walls = costmap.permanent_costmap()
+    pieces, _ = ndimage.label(walls.cells < INSCRIBED, np.ones((3, 3)))
+    (ix, iy), (goal_x, goal_y) = walls.world_to_cell(start.x, start.y), walls.world_to_cell(goal.x, goal.y)
+    rows, columns = np.nonzero(pieces == pieces[iy, ix])
+    reach = tolerance / walls.resolution + 1.0 if tolerance > 0.0 else 0.0
+    return bool(pieces[iy, ix]) and not (np.hypot(columns - goal_x, rows - goal_y) <= reach).any()
+
+
+def test_walls_separate_what_they_separate_when_every_cell_is_looked_at(rooms):
+    rng, answers = np.random.default_rng(2), []
+    costmap = rooms(gap=0, sensed=False)
+    for tolerance in (0.0, 0.3, 1.05, 2.5, 7.0, np.inf):
+        for ends in rng.uniform((0.1, 0.1), (10.0, 4.9), (60, 2, 2)):
+            start, goal = (Pose.planar(*end) for end in ends.tolist())
+            answers.append(is_permanently_unreachable(costmap, start, goal, tolerance))
+            assert answers[-1] == separated_by_hand(costmap, start, goal, tolerance)
+    assert 0.1 < np.mean(answers) < 0.9
