@@ -39,7 +39,7 @@ class Sources(ParameterModel):
     ("changes", "text"),
     [
         ({"sources": {"lidar": {"max_range": -1.0}}}, "map.sources.lidar.max_range: expected a number > 0 m, got -1.0"),
-        ({"sources": {"lidar": {"max": 1.0}}}, "map.sources.lidar.max: expected a known key, got 'max' (known keys: max_range)"),
+        ({"sources": {"lidar": {"max": 1.0}}}, "map.sources.lidar.max: expected a known key, got 'max' (known keys: m"),
         ({"delay": "long"}, "map.delay: expected a number in s, got 'long'"),
     ],
 )
