@@ -6,6 +6,11 @@ is to be driven may end off the target by all but a quarter of it, and the robot
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
+from mbf_abstract.plugins import PlanResult
+
 LEAST_SHARE_LEFT = 0.25
 """Of the tolerance, for stopping at the end of a path that does not reach the target."""
 
@@ -23,3 +28,16 @@ def tolerance_left(tolerance: float, off: float) -> float | None:
     if off == 0.0 or tolerance == 0.0:
         return None
     return max(tolerance - off, LEAST_SHARE_LEFT * tolerance)
+
+
+def ends_beside(distance: float, tolerance: float) -> str:
+    """Text of a path that ends so far [m] from its goal, within its tolerance [m]."""
+    return f"ends {distance:.2f} m from the goal (tolerance {tolerance:.2f} m)"
+
+
+def not_even_beside(problem: PlanResult, tolerance: float) -> PlanResult:
+    """Return a planner's failure, with the tolerance [m] of the goal that did not help; 0 = none was given."""
+    if tolerance <= 0.0:
+        return problem
+    around = f"within {tolerance:.2f} m of it" if tolerance < math.inf else "anywhere"
+    return replace(problem, message=f"{problem.message}; no place {around} can be reached either")

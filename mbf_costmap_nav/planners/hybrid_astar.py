@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw
+from mbf_abstract.goals.arrival_tolerance import ends_beside, not_even_beside
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
@@ -93,7 +94,7 @@ class HybridAStarPlanner(CostmapPlanner):
             if request.cancel_token.cancelled:
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if leg is None or len(leg.poses) == 0:
-                failure = failure or self._no_path(world, start, goal, leg, tolerance, name)
+                failure = failure or not_even_beside(self._no_path(world, start, goal, leg, name), tolerance)
                 return marked_if_permanent(failure, self.costmap, start, goal, tolerance)
             legs.append(leg)
         poses = np.concatenate([legs[0].poses, *(leg.poses[1:] for leg in legs[1:])])
@@ -101,7 +102,7 @@ class HybridAStarPlanner(CostmapPlanner):
         message = f"{len(path)} poses, {path.length:.2f} m"
         off = math.dist(poses[-1, :2], (request.goal.x, request.goal.y))
         if legs[-1].status != FOUND or off > 1e-6:
-            message += f", ends {off:.2f} m from the goal (tolerance {request.dist_tolerance:.2f} m)"
+            message += f", {ends_beside(off, request.dist_tolerance)}"
         return PlanResult(GetPathOutcome.SUCCESS, message, path, sum(leg.cost for leg in legs))
 
     def _world(self, request: PlanRequest) -> CarWorld:
@@ -144,14 +145,11 @@ class HybridAStarPlanner(CostmapPlanner):
             max_states=p.max_states,
         )
 
-    def _no_path(
-        self, world: CarWorld, start: Pose, goal: Pose, leg: CarLeg | None, tolerance: float, name: str
-    ) -> PlanResult:
+    def _no_path(self, world: CarWorld, start: Pose, goal: Pose, leg: CarLeg | None, name: str) -> PlanResult:
         """Failure with its cause: the goal is walled off, the car cannot get there, or the search gave up."""
         ends = f"from ({start.x:.2f}, {start.y:.2f}) to the {name} ({goal.x:.2f}, {goal.y:.2f})"
         if leg is None and not world.fits(goal):
             text = f"the robot does not fit at the goal ({goal.x:.2f}, {goal.y:.2f}, {goal.yaw:.2f} rad)"
-            text += f", and no place within {tolerance:.2f} m of it can be reached"
             return PlanResult(GetPathOutcome.BLOCKED_GOAL, text)
         if leg is None:
             return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no path {ends}, not even for a point robot")

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.arrival_tolerance import ends_beside, not_even_beside
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import PlanRequest, PlanResult
@@ -119,7 +120,7 @@ class GridPlanner(CostmapPlanner):
         message = f"{len(path)} poses, {path.length:.2f} m"
         off = math.dist(path.positions[-1][:2], (request.goal.x, request.goal.y))
         if not reached_goal or off > 1e-9:
-            message += f", ends {off:.2f} m from the goal (tolerance {request.dist_tolerance:.2f} m)"
+            message += f", {ends_beside(off, request.dist_tolerance)}"
         return PlanResult(GetPathOutcome.SUCCESS, message, path, cost)
 
     def _fitting(self, grid: SearchGrid) -> PathFitting | None:
@@ -145,7 +146,7 @@ class GridPlanner(CostmapPlanner):
             if request.cancel_token.cancelled:
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if len(leg.points) == 0:
-                failure = failure or _no_path(grid, start, goal, tolerance, name)
+                failure = failure or not_even_beside(_no_path(grid, start, goal, name), tolerance)
                 return marked_if_permanent(failure, self.costmap, start, goal, tolerance, self.parameters.lethal_cost)
             reached_goal = leg.reached_goal and grid.costmap.contains(goal.x, goal.y)
             piece = with_exact_ends(grid, leg.points, start, goal if reached_goal else None)
@@ -204,12 +205,11 @@ def _blocked(grid: SearchGrid, name: str, pose: Pose, cell: Cell) -> str:
     return f"{name} ({pose.x:.2f}, {pose.y:.2f}) lies in cell {cell} of cost {grid.costmap.cost(*cell)}"
 
 
-def _no_path(grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, name: str) -> PlanResult:
+def _no_path(grid: SearchGrid, start: Pose, goal: Pose, name: str) -> PlanResult:
     """Failure that distinguishes a goal without a reachable cell around it from a goal behind walls."""
     cell = grid.cell_of(goal)
     if grid.is_blocked(cell) or not grid.costmap.contains(goal.x, goal.y):
-        text = f"{_blocked(grid, name, goal, cell)}, and no cell within {tolerance:.2f} m of it can be reached"
-        return PlanResult(GetPathOutcome.BLOCKED_GOAL, text)
+        return PlanResult(GetPathOutcome.BLOCKED_GOAL, _blocked(grid, name, goal, cell))
     distance = math.hypot(goal.x - start.x, goal.y - start.y)
     text = (
         f"no path from ({start.x:.2f}, {start.y:.2f}) to the {name} ({goal.x:.2f}, {goal.y:.2f}), {distance:.2f} m away"

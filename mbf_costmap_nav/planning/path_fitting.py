@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose, normalize_angle
+from mbf_abstract.goals.arrival_tolerance import not_even_beside
 from mbf_abstract.maps.getting_free import getting_free
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
@@ -88,7 +89,7 @@ class PathFitting:
         text = f"the robot would touch {touched} at the goal {_text(goal)}"
         if (turned := find_valid_pose(self._snapshot, outline, goal, 0.0, math.pi).pose) is not None:
             text += f"; it fits there with the heading {turned.yaw:.2f} rad"
-        return PlanResult(GetPathOutcome.BLOCKED_GOAL, text)
+        return not_even_beside(PlanResult(GetPathOutcome.BLOCKED_GOAL, text), request.dist_tolerance)
 
     def fit(self, pieces: list[FloatArray], start: Pose, goal: Pose, tolerance: float) -> list[Fitted] | PlanResult:
         """Fit the legs (k, 2) [m] of a path from ``start`` on; the last one ends with the heading of ``goal``.

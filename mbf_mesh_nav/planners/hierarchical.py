@@ -16,6 +16,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.goals.arrival_tolerance import ends_beside, not_even_beside
 from mbf_abstract.maps.getting_free import getting_free
 from mbf_abstract.maps.map_plugin import MapContext, MapPlugin
 from mbf_abstract.outcomes import GetPathOutcome
@@ -118,12 +119,13 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         if request.cancel_token.cancelled:
             return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
         if problem is not None:
-            return problem
+            within = min(request.dist_tolerance, self._searched)
+            return not_even_beside(problem, within) if near_goal else problem
         legs = [Leg(plan.positions, plan.normals, plan.cost) for plan in plans]
         path = path_of_legs(legs, request.goal, not near_goal, self._map.frame_id, self.clock.now())
         notes = [plan.message for plan in plans]
         if near_goal:
-            notes.append(f"ends {path[-1].distance_to(request.goal):.2f} m from the goal")
+            notes.append(ends_beside(path[-1].distance_to(request.goal), request.dist_tolerance))
         return PlanResult(GetPathOutcome.SUCCESS, "; ".join(notes), path, sum(leg.cost for leg in legs))
 
     @property

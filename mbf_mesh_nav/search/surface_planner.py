@@ -19,6 +19,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.goals.arrival_tolerance import ends_beside, not_even_beside
 from mbf_abstract.maps.getting_free import getting_free
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -126,11 +127,11 @@ class SurfacePlanner(MeshPlanner):
         if request.cancel_token.cancelled:
             return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
         if problem is not None:
-            return problem
+            return not_even_beside(problem, request.dist_tolerance) if near_goal else problem
         path = path_of_legs(legs, request.goal, not near_goal, self.mesh_map.frame_id, self.clock.now())
         notes = [leg.note for leg in legs if leg.note]
         if near_goal:
-            notes.append(f"ends {path[-1].distance_to(request.goal):.2f} m from the goal")
+            notes.append(ends_beside(path[-1].distance_to(request.goal), request.dist_tolerance))
         return PlanResult(GetPathOutcome.SUCCESS, "; ".join(notes), path, sum(leg.cost for leg in legs))
 
     def _locate_stops(

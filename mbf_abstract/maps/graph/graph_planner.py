@@ -12,6 +12,7 @@ import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Path, Pose
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.goals.arrival_tolerance import ends_beside, not_even_beside
 from mbf_abstract.maps.graph.graph_map import BoolArray, GraphMap
 from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.queries import CellState
@@ -38,7 +39,7 @@ class GraphPlanner(AbstractPlanner):
         ends = [self._ends(pose, request.dist_tolerance if pose is request.goal else 0.0, free) for pose in stops]
         for pose, nodes, name in zip(stops, ends, names, strict=True):
             if not len(nodes):
-                return self._refused(pose, name)
+                return not_even_beside(self._refused(pose, name), request.dist_tolerance * (name == "goal"))
         graph, here = self._graph(free), int(ends[0][0])
         chain, cost = [here], 0.0
         for targets, name in zip(ends[1:], names[1:], strict=True):
@@ -47,14 +48,18 @@ class GraphPlanner(AbstractPlanner):
             costs, before = _dijkstra(graph, here)
             reached = targets[np.isfinite(costs[targets])]
             if not len(reached):
-                return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"start and {name} are not connected")
+                unreachable = PlanResult(GetPathOutcome.NO_PATH_FOUND, f"start and {name} are not connected")
+                return not_even_beside(unreachable, request.dist_tolerance * (name == "goal"))
             leg, here = [int(reached[0])], int(reached[0])
             cost += float(costs[here])
             while leg[-1] != chain[-1]:
                 leg.append(int(before[leg[-1]]))
             chain += leg[-2::-1]
         path = self._path(chain, request)
-        return PlanResult(GetPathOutcome.SUCCESS, f"{path.length:.2f} m over {len(chain)} nodes", path, cost)
+        text, off = f"{path.length:.2f} m over {len(chain)} nodes", path[-1].distance_to(request.goal)
+        if chain[-1] != self._map.node_at(request.goal.x, request.goal.y):
+            text += f", {ends_beside(off, request.dist_tolerance)}"
+        return PlanResult(GetPathOutcome.SUCCESS, text, path, cost)
 
     def _ends(self, pose: Pose, tolerance: float, free: BoolArray) -> Any:
         """Free nodes at a pose: the nearest one, then the others within the tolerance [m] in order of distance."""

@@ -131,9 +131,23 @@ def a_tolerance_lets_a_path_end_beside_a_blocked_goal(site: Site) -> None:
     """A tolerance of the goal lets the path end beside what blocks it, and no farther."""
     site.place(WALL)
     plan = site.navigator.get_path(FACE, dist_tolerance=1.0)
-    site.expect_outcome(plan, GetPathOutcome.SUCCESS)
+    site.expect_outcome(plan, GetPathOutcome.SUCCESS, " m from the goal (tolerance 1.00 m)")
     end = _end(plan.path, FACE.x, FACE.y)
     site.expect(0.2 < end <= 1.0, f"the path ends {end:.2f} m from the goal, allowed is 1 m")
+
+
+@situation()
+def a_tolerance_that_does_not_help_is_named(site: Site) -> None:
+    """A goal that cannot be reached even within its tolerance says so; without a tolerance nothing is said of it."""
+    site.place(WALL)
+    text = "no place within 0.05 m of it can be reached either"
+    site.expect_outcome(site.navigator.get_path(FACE, dist_tolerance=0.05), GetPathOutcome.BLOCKED_GOAL, text)
+    exact = site.navigator.get_path(FACE, dist_tolerance=0.0)
+    site.expect_outcome(exact, GetPathOutcome.BLOCKED_GOAL)
+    site.expect("can be reached" not in exact.message, f"no tolerance was given: {exact.message}")
+    site.place(*CAGE)
+    walled_in = site.navigator.get_path(somewhere(8.0, 4.0), dist_tolerance=0.05)
+    site.expect_outcome(walled_in, GetPathOutcome.NO_PATH_FOUND, text)
 
 
 @situation()
