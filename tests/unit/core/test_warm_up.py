@@ -5,7 +5,6 @@ import pytest
 from mbf_abstract.geometry import Pose
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner
 from mbf_abstract.testing.scripted_session import ScriptedSession
-from terrain.session.session import Session, SessionOptions
 
 PLUGINS = {"a": ScriptedPlanner, "b": ScriptedPlanner, "c": ScriptedController, "d": ScriptedController}
 ALL = ["planner a (1 of 4)", "planner b (2 of 4)", "controller c (3 of 4)", "controller d (4 of 4)"]
@@ -19,13 +18,3 @@ def test_all_plugins_are_warmed_up_or_those_that_a_goal_without_names_uses(only_
     with ScriptedSession(plugins=PLUGINS) as session:
         session.server.warm_up(Pose.planar(0.0, 0.0), Pose.planar(3.0, 0.0), steps.append, only_defaults)
     assert steps == [f"warming up {step}" for step in expected]
-
-
-@pytest.mark.timeout(600)  # kernels are compiled on a machine that has none
-def test_a_simulated_run_compiles_only_the_planner_and_the_controller_that_it_begins_with():
-    steps = []
-    Session("indoor", SessionOptions(backend="mesh", on_step=steps.append)).close()
-    assert [step for step in steps if "warming" in step] == [
-        "warming up planner astar (1 of 2)",
-        "warming up controller follower (2 of 2)",
-    ]
