@@ -132,7 +132,9 @@ class MeshNavigationServer(MapServer):
             for kind, plugin in renewed:
                 self.plugins.replace(kind, plugin)
             served.parameters = self.config.sections["mesh_map"].parameters
+            self.map_notes.forget()
             self._report_findings()
+            served.report_configuration_warnings()
         finally:
             for plugin in held:
                 plugin.release(self)

@@ -33,7 +33,7 @@ from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import with_changes
 from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
 from mbf_abstract.server.map_interface import MapInterface
-from mbf_abstract.server.plugin_notes import notes_on_plugins
+from mbf_abstract.server.plugin_notes import MapNotes, notes_on_plugins
 from mbf_abstract.server.process_end import ProcessEndWatch
 from mbf_abstract.time.clock import Clock
 from mbf_abstract.time.sim_clock import SimClock
@@ -78,7 +78,7 @@ class AbstractNavigationServer(MapInterface):
         check_driver(robot, clock)
         self._own_turning_radius = turning_radius_of(robot)
         super().__init__(self._make_runtime(config.parameters, robot, clock, transforms, events), seed)
-        self._process_end = ProcessEndWatch(self.runtime.gate)
+        self._process_end, self.map_notes = ProcessEndWatch(self.runtime.gate), MapNotes(self.runtime.events)
         try:
             self.load_map(config)
             for spec in config.plugins:
@@ -102,9 +102,7 @@ class AbstractNavigationServer(MapInterface):
             f"left out: optional {skipped.kind.name.lower()} {skipped.name!r}: {skipped.reason}"
             for skipped in self.config.skipped
         )
-        kept = self.runtime.events.memory
-        found = (str(event.data.get("message", "")) for event in (kept.of_kind(EventKind.MAP) if kept else ()))
-        return (*left_out, *found, *notes_on_plugins(self.plugins, self.runtime))
+        return (*left_out, *self.map_notes, *notes_on_plugins(self.plugins, self.runtime))
 
     # --------------------------------------------------------------------------------------- parameters
     def set_parameters(self, **changes: Any) -> None:

@@ -1,13 +1,36 @@
-"""Settings of plugins that do not fit the robot or the server: each note is a sentence for the user."""
+"""Notes of a server, each a sentence for the user: what was found in its maps, settings of plugins that do not fit."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from mbf_abstract.actions.meetings import own_distance
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.events import Event, EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.plugin_table import PluginTable
+
+
+class MapNotes:
+    """What was reported of the maps that are served now, as notes."""
+
+    def __init__(self, events: EventBus) -> None:
+        self._events = events
+        self._outdated: tuple[Event, ...] = ()
+
+    def __iter__(self) -> Iterator[str]:
+        for event in self._reported():
+            if not any(event is old for old in self._outdated):
+                yield str(event.data.get("message", ""))
+
+    def forget(self) -> None:
+        """Leave out what has been reported until now: the map of that is no longer there."""
+        self._outdated = self._reported()
+
+    def _reported(self) -> tuple[Event, ...]:
+        kept = self._events.memory
+        return kept.of_kind(EventKind.MAP) if kept else ()
 
 
 def notes_on_plugins(plugins: PluginTable, runtime: Runtime) -> Iterator[str]:

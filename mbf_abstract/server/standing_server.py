@@ -71,7 +71,8 @@ def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavi
     Raises
     ------
     ConfigError
-        There is no such file, no installed server reads its format, or it is a configuration with mistakes.
+        There is no such file, no installed server reads its format, it is a configuration with mistakes, or a state of
+        unknown cells is given for what has none.
     """
     if not (file.is_file() or file.is_dir()):
         raise ConfigError([Finding(str(file), 1, "", "a configuration, map or mesh file", "no such file")])
@@ -83,7 +84,11 @@ def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavi
     for cls in installed_servers(file.suffix):
         text = cls.config_for_map(file.resolve(), unknown_is_free=unknown != "lethal")
         if text is not None:
-            return *read_config_text(text), _unknown_note(cls.read_floor(file), unknown)
+            floor = cls.read_floor(file)
+            if unknown and floor is None:
+                expected = "a bare map with cells: a mesh knows no unknown ground, where there is none it has a hole"
+                raise ConfigError([Finding(str(file), 1, "", expected, f"--unknown {unknown} with {file.name}")])
+            return *read_config_text(text), _unknown_note(floor, unknown)
     if file.is_dir():
         expected = "a configuration, map or mesh file, or a folder of tiles (mbf map tile)"
         raise ConfigError([Finding(str(file), 1, "", expected, "a folder of something else")])

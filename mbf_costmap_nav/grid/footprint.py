@@ -24,6 +24,8 @@ from mbf_costmap_nav.grid.outline_check import outline_problem
 FloatArray = NDArray[np.float64]
 
 CIRCLE_POINTS = 16
+AS_A_CIRCLE = 1.02
+"""An outline whose radii differ by no more than this factor, which is that of 16 corners, stands for a circle."""
 MITRE_LIMIT = 2.0
 """A corner of an offset outline may stick out by this factor of the distance; sharper ones are cut off flat."""
 
@@ -64,6 +66,11 @@ class Footprint:
         """Footprint of a round robot: 16 points on the circle of ``radius`` [m], the first at (radius, 0)."""
         angles = np.arange(CIRCLE_POINTS) * (2.0 * math.pi / CIRCLE_POINTS)
         return cls(radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+
+    @property
+    def is_circle(self) -> bool:
+        """Whether it stands for a circle around the base, as that of ``circle`` does."""
+        return len(self.vertices) >= 3 and self.circumscribed_radius <= AS_A_CIRCLE * self.inscribed_radius
 
     @classmethod
     def parse(cls, value: str | Sequence[Sequence[float]]) -> Footprint:

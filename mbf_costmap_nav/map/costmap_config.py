@@ -18,11 +18,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import cast
 
 from pydantic import field_validator, model_validator
 
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.maps.layers.layer_list import LayerBlocks, LayerEntry, layer_loader, making, plan_layers
+from mbf_abstract.maps.layers.layer_list import LayerBlocks, LayerEntry, layer_loader, made_layer, plan_layers
 from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_costmap_nav.files.map_description import MapError
@@ -160,8 +161,8 @@ def build_layered_costmap(
             max_cells=parameters.max_cells,
             static_maps=static_maps,
         )
-        with making(context.name, passing=(MapError,)):
-            layers.append(planned.layer_class(context))
+        make = cast(Callable[[LayerContext], CostmapLayer], planned.layer_class)
+        layers.append(made_layer(context.name, partial(make, context), passing=(MapError,)))
     for layer in layers:
         static_maps.add(partial(getattr, layer, "floor_plan"))
     return LayeredCostmap(

@@ -87,7 +87,7 @@ class LayeredCostmap(LayerAnswers):
         for layer in layers:
             with making(layer.name):
                 layer.match_geometry(geometry)
-        self.set_footprint(footprint)
+        self.set_footprint(footprint, passing=())
 
     # ------------------------------------------------------------------------------------------------ reading
     def snapshot(self) -> Costmap:
@@ -234,15 +234,17 @@ class LayeredCostmap(LayerAnswers):
         self.set_footprint(parameters.robot_footprint(), parameters.footprint_padding)
         self.max_age = parameters.max_age
 
-    def set_footprint(self, footprint: Footprint, padding: float | None = None) -> None:
+    def set_footprint(
+        self, footprint: Footprint, padding: float | None = None, passing: tuple[type[Exception], ...] = (ValueError,)
+    ) -> None:
         """Replace the robot's outline (given without padding), e.g. when it lifts a load; ``padding`` [m] too if given.
 
-        The effect on the cells is visible after the next update.
+        The next update shows it. LayerListError names a layer that raises anything but errors that are ``passing``.
         """
         with self._lock:
             self._footprint_padding = self._footprint_padding if padding is None else padding
-            self.unpadded_footprint = footprint
-            self.footprint = footprint.padded(self._footprint_padding)
+            self.unpadded_footprint, self.footprint = footprint, footprint.padded(self._footprint_padding)
             for layer in self.layers.values():
-                layer.set_footprint(self.footprint, self.unpadded_footprint)
+                with making(layer.name, passing):
+                    layer.set_footprint(self.footprint, self.unpadded_footprint)
             self._window.recompute_all()

@@ -18,7 +18,7 @@ from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
 from mbf_abstract.maps.tracking.contact import RobotBox
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.grid.motion_check import nearest_lethal, obstacle_ahead
+from mbf_costmap_nav.grid.motion_check import blocked_cells, nearest_lethal, obstacle_ahead
 from mbf_costmap_nav.map import pose_checks
 
 ROUND = 1.05
@@ -91,12 +91,23 @@ class SnapshotAnswers(LayeredMap):
         return self.footprint if query.use_padded_footprint else self.unpadded_footprint
 
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
-        """Where the footprint would touch more than now if the robot kept ``command`` for ``duration`` [s]."""
-        return obstacle_ahead(self.snapshot(), self.footprint, pose, command, duration)
+        """Where the footprint would touch more than now if the robot kept ``command`` for ``duration`` [s].
+
+        A round robot that turns about its centre touches nothing new, whatever the polygon does that stands for it.
+        """
+        return self._obstacle_ahead(pose, command, duration)
 
     def obstacle_on_path(self, pose: Pose, command: Twist, duration: float) -> str:
         """As ``obstacle_ahead``, where the footprint may reach over the end of the map."""
-        return obstacle_ahead(self.snapshot(), self.footprint, pose, command, duration, may_overhang=True)
+        return self._obstacle_ahead(pose, command, duration, may_overhang=True)
+
+    def _obstacle_ahead(self, pose: Pose, command: Twist, duration: float, may_overhang: bool = False) -> str:
+        costmap = self.snapshot()
+        if command.speed == 0.0 and self.unpadded_footprint.is_circle:
+            blocked, covered = blocked_cells(costmap, self.footprint, pose.x, pose.y, pose.yaw)
+            if blocked < covered:  # where all of it lies on obstacles only ``escape`` may move
+                return ""
+        return obstacle_ahead(costmap, self.footprint, pose, command, duration, may_overhang=may_overhang)
 
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
         """Offset [m] to the centre of the nearest lethal cell; None if none is ``within`` [m]."""

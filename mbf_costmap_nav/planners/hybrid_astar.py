@@ -42,6 +42,8 @@ DEFAULT_RADIUS = 0.5
 ROOMY_STATES = 200_000
 """A path with some room to spare is searched with at most so many states, before one that only fits."""
 
+OVER_BORDER = "part of its outline would be off the map"
+
 
 class HybridAStarParameters(PluginParameters):
     """Parameters of ``costmap.hybrid_astar``."""
@@ -95,7 +97,10 @@ class HybridAStarPlanner(CostmapPlanner):
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if leg is None or len(leg.poses) == 0:
                 failure = failure or not_even_beside(self._no_path(world, start, goal, leg, name), tolerance)
-                return marked_if_permanent(failure, self.costmap, start, goal, tolerance)
+                failure = self._marked_at_border(failure, world, goal, tolerance)
+                return (
+                    failure if failure.permanent else marked_if_permanent(failure, self.costmap, start, goal, tolerance)
+                )
             legs.append(leg)
         poses = np.concatenate([legs[0].poses, *(leg.poses[1:] for leg in legs[1:])])
         path = to_path(poses, heights_along(poses[:, :2], request), world.costmap.frame_id, self.clock.now())
@@ -158,6 +163,15 @@ class HybridAStarPlanner(CostmapPlanner):
             return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)
         return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no drivable path {ends}, all {leg.states} states were tried")
 
+    def _marked_at_border(self, failure: PlanResult, world: CarWorld, goal: Pose, tolerance: float) -> PlanResult:
+        """A failure; permanent where, wherever the path may end, the outline would hang over a border that stays."""
+        slack = tolerance + world.costmap.resolution if tolerance > 0.0 else 0.0  # the search rounds headings
+        over = world.leaves_map(goal) and world.off_map_by(goal) >= slack
+        if failure.outcome != GetPathOutcome.BLOCKED_GOAL or self.costmap.rolling_window or not over:
+            return failure
+        text = "" if OVER_BORDER in failure.message else f"; {OVER_BORDER}"
+        return replace(failure, message=failure.message + text, permanent=True)
+
 
 def _misfit(world: CarWorld, name: str, pose: Pose, tolerance: float = 0.0) -> PlanResult | None:
     """Why nothing can be planned to or from a pose, if that is known without a search."""
@@ -167,7 +181,7 @@ def _misfit(world: CarWorld, name: str, pose: Pose, tolerance: float = 0.0) -> P
     outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
     text = f"the robot does not fit at the {name} ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad)"
     if world.leaves_map(pose):
-        return PlanResult(outcome, f"{text}: part of its outline would be off the map")
+        return PlanResult(outcome, f"{text}: {OVER_BORDER}")
     return PlanResult(outcome, f"{text}, centre cost {world.costmap.cost_at(pose.x, pose.y)}")
 
 

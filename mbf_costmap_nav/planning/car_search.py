@@ -141,9 +141,19 @@ class CarWorld:
 
     def leaves_map(self, pose: Pose) -> bool:
         """Whether a part of the footprint lies off the map."""
+        return not bool(self.costmap.world_to_cells(self._placed(pose))[1].all())
+
+    def _placed(self, pose: Pose) -> NDArray[np.float64]:
+        """The samples (n, 2) [m] of the footprint at a pose."""
         c, s, (x, y) = math.cos(pose.yaw), math.sin(pose.yaw), self.samples.T
-        placed = np.column_stack([pose.x + c * x - s * y, pose.y + s * x + c * y])
-        return not bool(self.costmap.world_to_cells(placed)[1].all())
+        return np.column_stack([pose.x + c * x - s * y, pose.y + s * x + c * y])
+
+    def off_map_by(self, pose: Pose) -> float:
+        """How far [m] the robot must move, without turning, until no part of its footprint lies off the map."""
+        placed, grid = self._placed(pose), self.costmap
+        low, high = placed.min(axis=0), placed.max(axis=0)
+        beyond_x = max(grid.origin_x - low[0], high[0] - grid.upper_x, 0.0)
+        return math.hypot(beyond_x, max(grid.origin_y - low[1], high[1] - grid.upper_y, 0.0))
 
     def field(self, source: Pose) -> NDArray[np.float32]:
         """(n,) cost [cells] of the padded grid's cells from a pose's cell around what blocks the centre."""

@@ -22,6 +22,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -33,6 +34,7 @@ from mbf_abstract.maps.layers.layer_list import (
     LayerListError,
     PlannedLayer,
     layer_loader,
+    made_layer,
     making,
     plan_layers,
 )
@@ -172,8 +174,8 @@ def compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer[MeshLayer]], c
         name, settings = planned.entry.name, cast(LayerParameters, planned.parameters)
         surface, errors = (mesh_map.topology, mesh_map.locator), (mesh_map.height_errors, mesh_map.place_errors)
         context = LayerContext(name, *surface, settings, inputs, mesh_map.frame_id, *errors)
+        layer = made_layer(name, partial(planned.layer_class, context), passing=(MeshError,))
         with making(name, passing=(MeshError,)):
-            layer = planned.layer_class(context)
             stored = cache.load(layer) if cache and layer.cacheable else None
             if stored is not None:
                 layer.replace(*stored)

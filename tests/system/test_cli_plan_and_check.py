@@ -72,6 +72,13 @@ def test_a_configuration_says_itself_what_unknown_is(tmp_path):
     assert result.exit_code == 2 and "track_unknown_space" in result.stderr
 
 
+@pytest.mark.parametrize("unknown", [FREE, LETHAL])
+def test_a_mesh_has_no_unknown_cells(hill, unknown):
+    result = mbf("plan", hill, "--start", 2, 2, "--goal", 9, 9, *unknown)
+
+    assert result.exit_code == 2 and f"got {' '.join(unknown)} with" in result.stderr and "cells" in result.stderr
+
+
 def test_on_a_grid_the_third_of_three_numbers_is_the_yaw(half_known):
     result = mbf("plan", half_known, "--start", 1, 2, 1.5, "--goal", 4, 2, -0.5, "--json", "--unknown", "free")
 

@@ -26,6 +26,7 @@ from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
 from mbf_abstract.parameters import ParameterModel, parameter
 
 Layer = TypeVar("Layer", bound=MapLayer)
+Made = TypeVar("Made")
 LayerBlocks = Mapping[str, Mapping[str, Any] | LayerParameters]
 """Layer name -> its block, raw or validated; a layer without one gets its defaults."""
 
@@ -47,6 +48,15 @@ def making(name: str, passing: tuple[type[Exception], ...] = ()) -> Iterator[Non
         raise
     except (Exception, SystemExit) as error:
         raise LayerListError(f"layer {name!r} raised {type(error).__name__}: {error_text(error)}") from error
+
+
+def made_layer(name: str, make: Callable[[], Made], passing: tuple[type[Exception], ...] = ()) -> Made:
+    """Make a layer; LayerListError with its name as ``making``, also where it does not call its base's constructor."""
+    with making(name, passing):
+        layer = make()
+        if getattr(layer, "name", None) != name or not hasattr(layer, "parameters"):
+            raise TypeError("its __init__ does not call super().__init__(context)")
+        return layer
 
 
 class LayerEntry(ParameterModel):

@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mbf_abstract.geometry import Pose, Twist
 from mbf_costmap_nav.grid.collision import footprint_costs
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 
 CORNERS = st.lists(st.floats(0.0, 2 * math.pi), min_size=3, max_size=8, unique_by=lambda angle: round(angle, 1))
 
@@ -106,3 +108,23 @@ def test_a_pose_collides_exactly_if_the_obstacle_cell_is_within_the_turned_outli
     )
     if abs(gaps.max()) > 1e-9:
         assert (footprint_costs(costmap, footprint, x, y, yaw).lethal > 0) == (gaps.max() < 0.0)
+
+
+@pytest.mark.parametrize("gap", [0.001, 0.006, 0.02])
+@pytest.mark.parametrize("yaw", [0.0, 0.1, 0.2])
+def test_a_round_robot_beside_a_wall_turns_whatever_the_corners_of_its_polygon_do(gap, yaw):
+    cells = np.zeros((80, 80), dtype=np.uint8)
+    cells[:, 40:] = 254
+    block = {"resolution": 0.05, "layers": [{"name": "walls", "type": "static"}]}
+    pose = Pose.planar(2.0 - 0.2 - gap, 2.0, yaw)
+
+    def turning(**outline):
+        parameters = CostmapParameters.model_validate({**block, **outline})
+        costmap = build_layered_costmap(parameters, static_map=Costmap(cells, 0.05))
+        costmap.update(pose, 0.0)
+        turn = Twist.planar(wz=1.0)
+        return costmap.obstacle_ahead(pose, turn, 1.0) or costmap.obstacle_on_path(pose, turn, 1.0)
+
+    assert turning(robot_radius=0.2) == ""
+    assert "(" in turning(footprint="[[0.2, 0.2], [0.2, -0.2], [-0.2, -0.2], [-0.2, 0.2]]")
+    assert Footprint.circle(0.3).is_circle and not Footprint.circle(0.3).padded(0.01).is_circle

@@ -48,6 +48,21 @@ def test_a_layer_that_cannot_be_made_is_named(error):
         costmap_with(error=error)
 
 
+def test_a_layer_that_forgets_the_constructor_of_its_base_is_named():
+    text = r"layer 'mine' raised TypeError: its __init__ does not call super\(\).__init__\(context\)"
+    with pytest.raises(LayerListError, match=text):
+        costmap_with(__init__=lambda self, context: None)
+
+
+@pytest.mark.parametrize("error", [KeyError("boom"), SystemExit(3), ValueError("too wide")])
+def test_a_layer_that_takes_no_first_footprint_is_named(error):
+    def refusing(self, footprint, unpadded):
+        raise error
+
+    with pytest.raises(LayerListError, match=f"layer 'mine' raised {type(error).__name__}"):
+        costmap_with(set_footprint=refusing)
+
+
 @pytest.mark.parametrize("box", [None, (0, 0, 1, 1)])
 def test_a_layer_that_returns_no_box_is_named_and_not_the_one_after_it(box):
     costmap = costmap_with(box=box)

@@ -127,7 +127,16 @@ def test_a_goal_whose_outline_hangs_over_the_border_says_so(make_plugin):
     result = plan(planner, (3, 3, 0), (5.7, 3, 0))
     assert result.outcome == GetPathOutcome.BLOCKED_GOAL
     assert result.message.endswith("(5.70, 3.00, 0.00 rad): part of its outline would be off the map")
+    assert result.permanent
     assert plan(planner, (3, 3, 0), (5.7, 3, math.pi)).success
+
+
+def test_a_tolerance_that_leads_off_the_border_is_no_permanent_failure(make_plugin):
+    planner = make_plugin(HybridAStarPlanner, np.zeros((60, 60), dtype=np.uint8), resolution=0.1, footprint=CAR)
+    tight = plan(planner, (3, 3, 0), (5.9, 3, 0), dist_tolerance=0.1)
+    assert (tight.outcome, tight.permanent) == (GetPathOutcome.BLOCKED_GOAL, True)
+    assert "no place within 0.10 m" in tight.message and tight.message.endswith("would be off the map")
+    assert plan(planner, (3, 3, 0), (5.7, 3, 0), dist_tolerance=1.5).success
 
 
 @pytest.mark.parametrize("radius", [4.0, 12.0, 20.0])

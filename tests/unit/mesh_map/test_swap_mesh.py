@@ -75,6 +75,18 @@ def test_every_finding_in_a_mesh_is_an_event_when_it_is_loaded_and_when_it_is_sw
     assert messages[3].startswith("components: 2 components, the largest with 441 of 882 vertices (indices 0, 441)")
 
 
+def test_the_notes_are_those_of_the_mesh_that_is_served(navigator, tmp_path):
+    first = navigator.server.notes
+    vertices, faces = heightfield_mesh(np.zeros((21, 21)), 0.2, 0.2)
+    far = np.vstack([vertices, vertices + np.array([10.0, 0.0, 0.0])])
+    trimesh.Trimesh(far, np.vstack([faces, faces + len(vertices)]), process=False).export(tmp_path / "two.ply")
+    navigator.server.swap_mesh("two.ply")
+    assert next(note for note in navigator.server.notes if note not in first).startswith("components: 2 components")
+    assert len(navigator.server.notes) == len(first) + 1
+    navigator.server.swap_mesh("small.ply")
+    assert navigator.server.notes == first
+
+
 @pytest.mark.parametrize("planner", ["astar", "cvp"])
 def test_goals_that_only_the_new_mesh_has_are_reached_after_the_swap(navigator, planner):
     assert navigator.get_path(FAR, planner=planner).outcome == GetPathOutcome.OUT_OF_MAP

@@ -20,6 +20,7 @@ from test_tile_server import pose
 from tiled_terrains import SPACING
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.maps.queries import CellState
 from mbf_mesh_nav.layers.obstacle import ObstacleLayer
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry
@@ -173,6 +174,21 @@ def test_on_tiles_that_have_changed_predictions_stay_and_a_layer_that_raises_is_
         with pytest.raises(ArithmeticError):
             change()
         assert "broken" in tiled.stale_reason(1.0)
+
+
+def test_a_layer_that_raises_while_a_window_is_made_is_named(tiled_hills, way, monkeypatch):
+    tiled = sensing_map(tiled_hills)
+    tiled.update(pose(way[0]), 0.0)
+
+    def broken(layer):
+        raise ArithmeticError("broken")
+
+    monkeypatch.setattr(ObstacleLayer, "recompute", broken)
+    with pytest.raises(LayerListError, match="layer 'obstacles' raised ArithmeticError: broken"):
+        tiled.update(pose(way[-1]), 1.0)
+    assert "layer 'obstacles' raised ArithmeticError: broken" in tiled.stale_reason(1.0)
+    monkeypatch.undo()
+    tiled.update(pose(way[-1]), 2.0)
 
 
 @pytest.mark.parametrize("senses", [True, False])

@@ -7,14 +7,17 @@ lies on both. What lies off the new one is forgotten, so memory is bounded by th
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from mbf_abstract.maps.layers.layer_list import made_layer, making
 from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
+from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED, SensedCosts
 from mbf_mesh_nav.tiles.serving.surroundings import StoredLayer, Surroundings, stored_layer
 from mbf_mesh_nav.tiles.serving.windows.window_settings import MOVES_AT, SHOWN, WindowSettings
@@ -43,8 +46,8 @@ class Window:
 
     Raises
     ------
-    Exception
-        What a layer raises.
+    LayerListError
+        A layer raises; the text names it.
     """
 
     def __init__(
@@ -75,10 +78,11 @@ class Window:
             parameters: Any = one.parameters if before is None else before.parameters
             inputs = tuple(layers[read] for read in one.entry.reads)
             context = LayerContext(name, mesh_map.topology, mesh_map.locator, parameters, inputs, mesh_map.frame_id)
-            layers[name] = one.layer_class(context)
-            if before is not None:
-                layers[name].take_over(before)
-            layers[name].recompute()
+            layers[name] = layer = made_layer(name, partial(one.layer_class, context), passing=(MeshError,))
+            with making(name, passing=(MeshError,)):
+                if before is not None:
+                    layer.take_over(before)
+                layer.recompute()
         return list(layers.values())
 
     def holds(self, x: float, y: float, radius: float) -> bool:
