@@ -15,6 +15,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbf_abstract.execution.path_cusps import find_cusps, points_along
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
 from mbf_abstract.geometry.polyline import polyline_lengths, reverse_segments
@@ -30,9 +31,6 @@ LEADS_AWAY = (1.5, 0.1)
 """The path leads away where it is farther from the robot than this factor times the least distance plus this [m]."""
 SAME_PLACE = 0.3
 """A robot joins a path at the earliest place that is at most this much farther off [m] than the nearest one."""
-ARM, GAINED = 0.2, 0.2
-"""A path turns back on itself where two of its points, ``ARM`` [m] before and behind, are nearer than ``GAINED`` [m]:
-by 120 degrees, or on a smooth bend of a radius below 0.11 m."""
 SHORT_ARM = 0.1
 """The path leads to a cusp as it does over so much [m] before it, if its section is that long."""
 CHUNK = 32
@@ -73,9 +71,7 @@ class PathTracker:
         self.points: FloatArray = np.ascontiguousarray(path.positions[:, :dimensions])
         self.lengths = polyline_lengths(self.points)
         self.reverse = reverse_segments(path, self.points)
-        switches = self.lengths[1:-1][self.reverse[1:] != self.reverse[:-1]]
-        turns = [turn for turn in self._turns_back().tolist() if not np.any(np.abs(switches - turn) <= ARM)]
-        self.cusps: FloatArray = np.unique(np.concatenate([switches, turns, self.lengths[-1:]]))
+        self.cusps: FloatArray = find_cusps(self.points, self.lengths, self.reverse)
         self.deviation, self.cusp_reached, self._joined = 0.0, CUSP_REACHED, False
         self._advance(0.0)
 
@@ -146,6 +142,10 @@ class PathTracker:
             self._advance(self.next_cusp)
         return is_near
 
+    def end(self) -> None:
+        """Take the path for driven to its end."""
+        self._advance(self.length)
+
     def seen_from(self, transform: Transform) -> PathTracker:
         """Return the same path and progress in the transform's parent frame."""
         moved = copy(self)
@@ -181,7 +181,7 @@ class PathTracker:
 
     def points_at(self, lengths: FloatArray) -> FloatArray:
         """Points (m, dimensions) of the path at ``lengths`` (m,) [m] along it, clamped to its ends."""
-        return np.stack([np.interp(lengths, self.lengths, column) for column in self.points.T], axis=-1)
+        return points_along(self.points, self.lengths, lengths)
 
     def ahead(self, distance: float) -> FloatArray:
         """Points (m, dimensions) of the path from the progress on, over ``distance`` [m]; at least two."""
@@ -231,16 +231,6 @@ class PathTracker:
         shares = np.clip(along / np.maximum(squares, _POSITION_NOISE), 0.0, 1.0)
         gaps = norm(offsets - shares[:, None] * sides)
         return float(self.lengths[int(np.argmax(gaps <= gaps.min() + SAME_PLACE))])
-
-    def _turns_back(self) -> FloatArray:
-        """Lengths along the path [m] of the poses at which it turns back on itself: one, the sharpest, a turn."""
-        inner = self.lengths[(self.lengths >= ARM) & (self.lengths <= self.length - ARM)]
-        if not len(inner):
-            return inner
-        gained = norm(self.points_at(inner + ARM) - self.points_at(inner - ARM))
-        turning, gained = inner[gained < GAINED], gained[gained < GAINED]
-        turns = np.split(np.arange(len(turning)), np.flatnonzero(np.diff(turning) > ARM) + 1)
-        return turning[np.array([turn[np.argmin(gained[turn])] for turn in turns if len(turn)], dtype=np.intp)]
 
 
 def _norm(components: Iterable[float]) -> float:

@@ -120,6 +120,13 @@ class NavigationMap(ABC):
         With ``center_only`` only the point below the robot's origin is looked at.
         """
 
+    def path_check(self, query: PlaceQuery) -> PlaceCheck:
+        """As ``pose_check``, of a robot on its path: LETHAL where ``obstacle_on_path`` would not let it come.
+
+        Maps that plan by something else than what an outline touches say here what they plan by.
+        """
+        return self.pose_check(query)
+
     @abstractmethod
     def find_valid_pose(
         self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery

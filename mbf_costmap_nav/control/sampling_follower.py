@@ -64,8 +64,8 @@ class SamplingFollower(PathFollower):
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """As for all; whoever keeps to the path needs the tolerances, too."""
-        self._keeping.update(pose, dist_tolerance, angle_tolerance)
-        return super().is_goal_reached(pose, dist_tolerance, angle_tolerance)
+        reached = self._keeping.update(pose, dist_tolerance, angle_tolerance)
+        return super().is_goal_reached(pose, dist_tolerance, angle_tolerance) or reached
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """Sample, or keep to the path."""

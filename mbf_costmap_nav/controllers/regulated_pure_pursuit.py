@@ -1,9 +1,9 @@
 """Regulated pure pursuit: steer along the arc to a carrot on the path, slower in curves, near obstacles, at the end.
 
-When to use: a good global path that is to be followed as it is, at little computing time (under 0.2 ms a cycle).
-Forward-only, reversing and turn-in-place robots. When not: obstacles that are not in the path - it stops before them
-(BLOCKED_PATH) and never drives around; that needs replanning, ``costmap.dwa`` or ``costmap.mppi``. It cuts corners by
-about look_ahead^2 / (8 * radius).
+When to use: a good global path that is to be followed as it is, at little computing time (under 0.2 ms a cycle, 0.3 ms
+while it turns at its goal). Forward-only, reversing and turn-in-place robots. When not: obstacles that are not in the
+path - it stops before them (BLOCKED_PATH) and never drives around; that needs replanning, ``costmap.dwa`` or
+``costmap.mppi``. It cuts corners by about look_ahead^2 / (8 * radius).
 
 Formula: pure pursuit (Coulter 1992), curvature = 2 y / L^2; the speeds are those of ``control.regulated_speed``.
 """
@@ -17,11 +17,13 @@ import numpy as np
 from mbf_abstract.execution.path_tracker import CUSP_REACHED
 from mbf_abstract.geometry import Path, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.controllers.end_of_path import at_exact_end, swept_poses, turn_left
 from mbf_abstract.maps.controllers.failures import blocked_path, obstacle_text
 from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
     along_path,
+    angle_to_path,
     closely_along_path,
     curves_ahead,
     off_course,
@@ -38,6 +40,7 @@ from mbf_costmap_nav.grid.costmap import FREE
 from mbf_costmap_nav.grid.footprint import Footprint
 
 LEADS_OUT = 0.3  # m; so far a robot that touches something looks whether the motion leads out
+SWEEP_STEP = 0.1  # cells; from pose to pose of a turn at the goal, which must look the same from every heading in it
 SLOWEST = 0.01  # m/s; slower commands are looked ahead for as long as this one, to bound the work
 
 
@@ -74,7 +77,11 @@ class RegulatedPurePursuitController(RegulatedFollower):
         cycle = self.begin_cycle(request)
         if isinstance(cycle, ControlResult):
             return cycle
-        result = self._checked(cycle, self._motions(cycle))
+        motions = self._motions(cycle)
+        result = self._checked(cycle, motions)
+        drives_otherwise = result.success and result.command != motions[0] and motions[0].vx != 0.0
+        if drives_otherwise and self._tight_places.was_blocked(cycle.tracker):
+            return self.compute_velocity_commands(request)
         blocked = result.outcome == ExePathOutcome.BLOCKED_PATH
         if blocked and self.tracker and self._tight_places.begin_next_stroke(self.tracker):
             return self.compute_velocity_commands(request)
@@ -82,9 +89,10 @@ class RegulatedPurePursuitController(RegulatedFollower):
 
     def _motions(self, cycle: ControlCycle) -> list[Twist]:
         """The motion that is wanted, then those that make room for it."""
+        backward, pose = self._backward(cycle), cycle.request.pose
         if (turn := self._turn_at_goal(cycle)) is not None:
-            return [self._turn(cycle, turn)]
-        carrot, backward = self._carrot(cycle), self._backward(cycle)
+            return at_exact_end(pose, cycle.tracker, backward, turn, lambda angle: self._turn(cycle, angle))
+        carrot = self._carrot(cycle)
         if close := self._closely(cycle, backward):
             return close
         error = off_course(math.atan2(carrot[1], carrot[0]), backward)
@@ -116,25 +124,25 @@ class RegulatedPurePursuitController(RegulatedFollower):
         return Twist.planar(speed, wz=motion.wz / motion.vx * speed)
 
     def _along_path(self, cycle: ControlCycle) -> list[Twist]:
-        """Motions that keep to the path, if the outline fits on it as far as the look-ahead at full speed."""
+        """Motions that keep to the path before its end, if the outline fits on it as far as the farthest look-ahead."""
+        if self._at_goal:
+            return []
         backward, pose = self._backward(cycle), cycle.request.pose
         ahead = poses_ahead(cycle.tracker, self.look_ahead_distance(self.full_speed), backward)
         if cycle.first_collision(ahead) >= 0:
             return []
         close = along_path(cycle.tracker, pose, backward)
         motions = [motion for motion in close if abs(motion.wz) * self.turning_radius <= abs(motion.vx)]
-        if self._at_goal or not self.rotates:
+        if not self.rotates:
             return motions
-        error = self._angle_left(cycle)
+        error = angle_to_path(cycle.tracker, pose, backward)
         return [*motions, self._turn(cycle, error)] if abs(error) > SMALL_TURN else motions
 
     def _backward(self, cycle: ControlCycle) -> bool:
         return self.parameters.allow_reversing and cycle.tracker.driving_backward
 
     def _angle_left(self, cycle: ControlCycle) -> float:
-        """Angle [rad] to the goal's heading where the robot stands at the goal, else to the carrot."""
-        if (turn := self._turn_at_goal(cycle)) is not None:
-            return turn
+        """Angle [rad] to the carrot."""
         carrot = self._carrot(cycle)
         return off_course(math.atan2(carrot[1], carrot[0]), self._backward(cycle))
 
@@ -201,6 +209,8 @@ class RegulatedPurePursuitController(RegulatedFollower):
 
     def _blocked(self, cycle: ControlCycle, command: Twist) -> str:
         """Where a command leads into an obstacle in the check time, not beyond the next cusp; empty if free."""
+        if self._at_goal and command.vx == 0.0:
+            return self._blocked_at_goal(cycle, command)
         duration, shortest = self.parameters.check_ahead_time, self.parameters.min_distance_to_obstacle
         if cycle.touches:
             shortest = max(shortest, LEADS_OUT)
@@ -222,3 +232,18 @@ class RegulatedPurePursuitController(RegulatedFollower):
             return ""
         x, y = poses[hit, 0], poses[hit, 1]
         return obstacle_text(f"({x:.2f}, {y:.2f}) in {(hit + 1) * step:.2f} s")
+
+    def _blocked_at_goal(self, cycle: ControlCycle, command: Twist) -> str:
+        """Where a turn at the goal leads into an obstacle before the robot has its heading; empty if it does not.
+
+        One that still turns the wrong way only brakes.
+        """
+        turn, now = self._turn_at_goal(cycle) or 0.0, cycle.request.velocity.wz
+        brakes = command.wz * turn < 0.0 and abs(command.wz) < abs(now) and command.wz * now > 0.0
+        angle = 0.5 * command.wz**2 / self.parameters.acc_lim_theta if brakes else turn_left(turn, command)
+        resolution = cycle.costmap.resolution
+        step = SWEEP_STEP * resolution / max(cycle.footprint.footprint.circumscribed_radius, resolution)
+        poses = swept_poses(cycle.request.pose, math.copysign(angle, command.wz), step)
+        hit = cycle.first_collision(poses)
+        x, y, yaw = poses[hit]
+        return obstacle_text(f"({x:.2f}, {y:.2f}, {yaw:.2f} rad)") if hit >= 0 else ""

@@ -16,7 +16,7 @@ from mbf_abstract.navigator import Navigator
 from mbf_abstract.server.standing_server import place_robot, read_config_or_map, standing_server
 from mbf_mesh_nav.arrays import BoolArray, FloatArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
-from mbf_mesh_nav.map.snapshot_answers import FORBIDDEN_COST
+from mbf_mesh_nav.map.places import FORBIDDEN_COST
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from mbf_mesh_nav.files.elevation_files import elevation_readers
 from mbf_mesh_nav.files.file_frames import GLTF_FORMATS, FileFrame, file_frame
 from mbf_mesh_nav.files.map_header import read_map_header
 from mbf_mesh_nav.map.mesh_map import MeshMap
-from mbf_mesh_nav.map.snapshot_answers import FORBIDDEN_COST
+from mbf_mesh_nav.map.places import FORBIDDEN_COST
 from mbf_mesh_nav.mesh.mesh_report import Finding
 
 LETHAL_SHARE = 0.95

@@ -35,6 +35,9 @@ from mbf_mesh_nav.mesh.topology import MeshTopology
 SURFACE_DISTANCE = 0.5
 """How far [m] a position may be off the surface to count as on it; less than a storey, more than a wheel."""
 
+FORBIDDEN_COST = 1.0
+"""Ground whose cost reaches this is not driven onto, by a plan or in a recovery, but along the robot's own track."""
+
 ON_EDGE = 1e-12
 """Share of a corner up to which a place lies on the edge opposite to it."""
 
@@ -80,6 +83,19 @@ class MeshPlaces:
         around = self._disc(place, 2.0 * self.inscribed_radius + query.safety_dist)
         state = CellState.INSCRIBED if self._blocked(around).any() else CellState.FREE
         return PlaceAnswer(state, float(costs.sum()))
+
+    def check_on_path(self, pose: Pose) -> PlaceAnswer:
+        """State and cost of the vertex nearest to a robot's centre: LETHAL if no plan would touch it.
+
+        Ground is free where the nearest corner of its face is, see ``kernels.search.forbidden_surface``.
+        """
+        place = self._on_surface(pose)
+        if place is None:
+            return OUTSIDE
+        vertex = self._nearest_vertex(place)
+        cost = float(self.snapshot.costs[vertex])
+        is_free = cost < FORBIDDEN_COST and not self.snapshot.lethal[vertex]
+        return PlaceAnswer(CellState.FREE if is_free else CellState.LETHAL, cost)
 
     def find_valid_pose(self, pose: Pose, dist_tolerance: float, query: PlaceQuery) -> PoseAnswer:
         """Nearest pose within ``dist_tolerance`` [m] where the disc fits: the pose itself, else a vertex near it.

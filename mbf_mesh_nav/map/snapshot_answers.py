@@ -15,8 +15,8 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
 from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.map.places import FORBIDDEN_COST, MeshPlaces
 from mbf_mesh_nav.map.places import SURFACE_DISTANCE as OF_PLACES
-from mbf_mesh_nav.map.places import MeshPlaces
 from mbf_mesh_nav.map.robot_outline import OutlinedMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.borders import beyond_border
@@ -27,9 +27,6 @@ from mbf_mesh_nav.mesh.turning import pivots, slope_at, swept_obstacle
 
 if TYPE_CHECKING:
     import networkx
-
-FORBIDDEN_COST = 1.0
-"""Ground whose cost reaches this is not driven onto in a recovery, but along the robot's own track."""
 
 
 class SnapshotAnswers(OutlinedMap):
@@ -116,6 +113,10 @@ class SnapshotAnswers(OutlinedMap):
         """State and summed cost below the robot's disc."""
         places = self.places()
         return places.check_point if center_only else lambda pose: places.check_pose(pose, query)
+
+    def path_check(self, query: PlaceQuery) -> PlaceCheck:
+        """State of the ground below the robot's centre as planners look at it: LETHAL where it costs too much."""
+        return self.places().check_on_path
 
     def find_valid_pose(
         self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery

@@ -14,7 +14,7 @@ import numpy as np
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.controllers.failures import obstacle_text
-from mbf_mesh_nav.arrays import BoolArray, Float32Array
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned, walk
 from mbf_mesh_nav.kernels.mesh.vectors import Vector
@@ -56,7 +56,7 @@ def forbidden_ahead(
         How far [m] the robot reaches beyond its centre.
     surface : SurfaceLocator, optional
         Of a robot that follows a path. Only its centre may not leave the surface, nor come onto what costs too much, as
-        planners ask for no more; beyond its centre it may touch all but lethal ground.
+        planners ask for no more; beyond its centre it may touch all but a lethal vertex, as in ``check_pose``.
     """
     face, point = place.face, vector_of(place.point)
     stands_on = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
@@ -66,8 +66,11 @@ def forbidden_ahead(
     ahead = pose.rotation[:, 0] * command.vx + pose.rotation[:, 1] * command.vy
     direction = tangent(vector_of(ahead), vector_of(mesh.face_normals[face]))
     on_arc, total, walked = command.speed * duration, command.speed * duration + radius, 0.0
+    centre = np.array(point)
     while walked < total:
         stride = min(STRIDE, total - walked)
+        if walked < on_arc:
+            centre = np.array(point) + min(stride, on_arc - walked) * np.array(direction)
         face, point, direction, done = walk(
             mesh.vertices, mesh.faces, mesh.face_neighbours, mesh.face_normals, face, point, direction, stride
         )
@@ -75,7 +78,8 @@ def forbidden_ahead(
         if ends and surface is None:
             return f"the surface ends at {position_text(point)}"
         comes_to = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
-        reaches_over = surface is not None and walked >= on_arc and not _is_lethal(mesh, ranks, face, point)
+        is_ahead = surface is not None and walked >= on_arc
+        reaches_over = is_ahead and not _touches_lethal(mesh, ranks, face, point, centre, radius)
         if not (may_enter(stands_on, comes_to) or reaches_over):
             return obstacle_text(position_text(point))
         if ends and surface is not None:
@@ -87,11 +91,14 @@ def forbidden_ahead(
     return ""
 
 
-def _is_lethal(mesh: MeshTopology, ranks: Float32Array, face: int, point: Vector) -> bool:
-    """Whether the corner of a face that is nearest to a point in it is lethal."""
+def _touches_lethal(
+    mesh: MeshTopology, ranks: Float32Array, face: int, point: Vector, centre: FloatArray, radius: float
+) -> bool:
+    """Whether the corner of a face that is nearest to a point in it is lethal, and within the robot's disc."""
     corners = mesh.faces[face]
     nearest = corners[int(np.argmin(norm(mesh.vertices[corners] - np.array(point))))]
-    return bool(ranks[nearest] >= LETHAL_RANK)
+    distance = float(norm(mesh.vertices[nearest] - centre))
+    return bool(ranks[nearest] >= LETHAL_RANK) and distance <= radius
 
 
 def _past_border(

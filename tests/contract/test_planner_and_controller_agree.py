@@ -32,9 +32,15 @@ REFUSED = (
     ("straight_line", "follow_path", 20), ("theta_star", "follow_path", 20), ("astar", "follow_path", 23),
     ("dijkstra", "regulated_pure_pursuit", 325), ("astar", "regulated_pure_pursuit", 353),
     ("astar", "follow_path", 353), ("hybrid_astar", "follow_path", 387),
-    ("hybrid_astar", "regulated_pure_pursuit", 387),
+    ("hybrid_astar", "regulated_pure_pursuit", 387), ("theta_star", "regulated_pure_pursuit", 436),
+    ("astar", "regulated_pure_pursuit", 448), ("dijkstra", "follow_path", 448), ("astar", "follow_path", 459),
 )  # fmt: skip
 """Drives on the costmap that were refused twice at one place."""
+REFUSED_ON_MESHES = (
+    ("dijkstra", "follow_path", 307), ("cvp", "follow_path", 315), ("dijkstra", "follow_path", 323),
+    ("any_angle", "follow_path", 336),
+)  # fmt: skip
+"""The same on the mesh; the first goes through a passage of one vertex, the third to a goal at the end of another."""
 AT_LIMITS = (
     ("costmap", "astar", 8, True), ("costmap", "theta_star", 8, True), ("mesh", "dijkstra", 84, True),
     ("mesh", "dijkstra", 65, True), ("mesh", "dijkstra", 84, False), ("mesh", "dijkstra", 104, True),
@@ -47,7 +53,7 @@ STOOD = (
     ("costmap", "dijkstra", "dwa", 308), ("costmap", "dijkstra", "dwa", 325), ("costmap", "hybrid_astar", "mppi", 325),
     ("costmap", "theta_star", "rotation_shim", 325), ("costmap", "theta_star", "dwa", 344),
     ("costmap", "astar", "dwa", 353), ("costmap", "theta_star", "mppi", 353), ("costmap", "theta_star", "dwa", 415),
-    ("mesh", "dijkstra", "mppi", 65), ("mesh", "dijkstra", "mppi", 67),
+    ("mesh", "dijkstra", "mppi", 65), ("mesh", "dijkstra", "mppi", 67), ("mesh", "any_angle", "mppi", 323),
 )  # fmt: skip
 """Drives with sampled motions that stood before their goal until their time was over, crept, or touched something."""
 THROUGH_GAPS = [
@@ -69,6 +75,7 @@ def driven_pairs():
         chosen = [pair for pair in agreement.pairs(backend) if pair[1] in FOLLOWERS]
         yield from ((backend, *pair, seed) for pair in chosen for seed in seeds)
     yield from (("costmap", *drive) for drive in REFUSED)
+    yield from (("mesh", *drive) for drive in REFUSED_ON_MESHES)
 
 
 @pytest.mark.parametrize(("backend", "planner"), [pytest.param(*one, id=".".join(one)) for one in every_planner()])

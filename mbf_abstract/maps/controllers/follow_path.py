@@ -17,11 +17,14 @@ from mbf_abstract.execution.path_tracker import CUSP_REACHED, PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.maps.controllers.end_of_path import at_exact_end, turn_left
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_path, no_path, outside_map, storeys_off
+from mbf_abstract.maps.controllers.follow_path_parameters import FollowPathParameters
 from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
     along_path,
+    angle_to_path,
     closely_along_path,
     curves_ahead,
     off_course,
@@ -33,36 +36,8 @@ from mbf_abstract.maps.controllers.turn_at_goal import TurnAtGoal, from_goal
 from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.queries import AS_CONFIGURED, PADDED, CellState
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
-
-
-class FollowPathParameters(PluginParameters):
-    """Parameters of ``follow_path``."""
-
-    max_vel_x: float = parameter(0.5, "Speed on a straight path.", unit="m/s", gt=0.0, le=20.0)
-    max_vel_theta: float = parameter(1.0, "Largest yaw rate.", unit="rad/s", gt=0.0, le=20.0)
-    decel_lim_x: float = parameter(0.5, "Deceleration planned before the goal.", unit="m/s^2", gt=0.0, le=100.0)
-    look_ahead_dist: float = parameter(
-        0.5, "Distance along the path of the point that is steered to.", unit="m", gt=0.0, le=20.0
-    )
-    rotate_to_heading_min_angle: float = parameter(
-        0.8, "The robot turns on the spot to a point farther off its heading.", unit="rad", gt=0.0, le=math.pi
-    )
-    turn_gain: float = parameter(2.0, "Yaw rate per heading error when turning on the spot.", unit="1/s", gt=0.0)
-    check_ahead_time: float = parameter(1.0, "How far ahead the motion must be free.", unit="s", gt=0.0, le=10.0)
-    make_room_dist: float = parameter(
-        0.5,
-        "How far it may drive on in a wider curve where turning would touch something; 0 = it stops.",
-        unit="m",
-        ge=0.0,
-        le=10.0,
-    )
-    allow_reversing: bool = parameter(True, "Drive backward where the poses of the path look against its direction.")
-    max_path_distance: float = parameter(
-        1.0, "Farther from the path than this the path is missed.", unit="m", gt=0.0, le=100.0
-    )
-
 
 MIN_SPEED = 0.05  # m/s; below it a robot would not reach the end of its path
 AT_END = 0.05  # m; nearer to the goal a robot only turns to its heading, unless the goal's tolerance is less
@@ -80,6 +55,8 @@ class FollowPath(MapPlugin, AbstractController):
     _tight_places = TightPlaces()
     _turn_at_goal = TurnAtGoal(AT_END)
     _dist_tolerance = 0.0
+    ended_early = False
+    """Whether the path led no nearer to its goal than the robot has come."""
 
     @property
     def turns_on_the_spot(self) -> bool:
@@ -102,6 +79,7 @@ class FollowPath(MapPlugin, AbstractController):
         """Take over a path that has poses."""
         self._tracker = PathTracker(path, dimensions=2) if len(path) else None
         self._room_to_turn, self._tight_places, self._turn_at_goal = RoomToTurn(), TightPlaces(), TurnAtGoal(AT_END)
+        self.ended_early = False
         return self._tracker is not None
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
@@ -128,17 +106,20 @@ class FollowPath(MapPlugin, AbstractController):
             there = self.on_map(pose)
             if self.navigation_map.point_check()(there).state is CellState.OUTSIDE:
                 return outside_map(f"({there.x:.2f}, {there.y:.2f})")
+            motions = self._motions(pose, tracker)
             command, obstacle = self._room_to_turn.choose(
                 pose,
                 tracker.progress,
-                self._motions(pose, tracker),
+                motions,
                 p.make_room_dist,
                 blocked,
                 lambda: self._along_path(pose, tracker, p.look_ahead_dist),
             )
         except TransformError as error:
             return ControlResult(ExePathOutcome.TF_ERROR, str(error))
-        if obstacle and self._tight_places.begin_next_stroke(tracker):
+        if command not in (None, motions[0]) and motions[0].vx != 0.0 and self._tight_places.was_blocked(tracker):
+            return self.compute_velocity_commands(request)
+        if obstacle and (self._tight_places.begin_next_stroke(tracker) or self._ends_here(pose, tracker)):
             return self.compute_velocity_commands(request)
         if obstacle:
             return blocked_path(self.navigation_map, there, obstacle)
@@ -163,7 +144,7 @@ class FollowPath(MapPlugin, AbstractController):
         backward = self._backward(tracker)
         gap, turn = self._from_goal(pose, tracker)
         if self._turn_at_goal.is_turning:
-            return [self._turn(turn)]
+            return at_exact_end(pose, tracker, backward, turn, self._turn)
         bearing, curvature = self._carrot(pose, tracker)
         error = off_course(bearing, backward)
         tracker.cusp_reached = CUSP_REACHED
@@ -180,8 +161,13 @@ class FollowPath(MapPlugin, AbstractController):
         return wider_curves(Twist.planar(vx=speed, wz=turn))
 
     def _time_checked(self, motion: Twist, pose: Pose, tracker: PathTracker) -> float:
-        """How long [s] a motion must be free: until it ends at a cusp or has turned far enough, at most as set."""
+        """How long [s] a motion must be free: until it ends at a cusp or has turned far enough, at most as set.
+
+        Of a turn to the goal's heading the whole sweep must be: where it is blocked later, no way is left to drive on.
+        """
         left, speed = min(tracker.to_cusp, self._arc_to_goal(pose, tracker)), abs(motion.vx)
+        if motion.vx == 0.0 != motion.wz and self._turn_at_goal.is_turning:
+            return max(turn_left(self._from_goal(pose, tracker)[1], motion) / abs(motion.wz), SHORTEST_CHECK)
         if motion.vx == 0.0:
             left, speed = abs(self._angle_left(pose, tracker)), abs(motion.wz)
         longest = self.parameters.check_ahead_time
@@ -202,13 +188,12 @@ class FollowPath(MapPlugin, AbstractController):
 
         A robot that cannot come nearer to its goal, but stands within its tolerance, only turns to its heading.
         """
-        gap, turn = self._from_goal(pose, tracker)
-        if gap <= self._dist_tolerance and tracker.has_arrived(self._dist_tolerance) and abs(turn) > SMALL_TURN:
-            return [self._turn(turn)]
+        if tracker.has_arrived(self._dist_tolerance) and self._ends_here(pose, tracker):
+            return [self._turn(self._from_goal(pose, tracker)[1])]
         backward, fits = self._backward(tracker), outline_fits(self, pose, AS_CONFIGURED)
         if not all(fits(*one) for one in poses_ahead(tracker, reach, backward).tolist()):
             return []
-        error = self._angle_left(pose, tracker)
+        error = angle_to_path(tracker, pose, backward)
         return [*along_path(tracker, pose, backward), *([self._turn(error)] if abs(error) > SMALL_TURN else [])]
 
     def _stays_on_map(self, pose: Pose, tracker: PathTracker) -> bool:
@@ -225,6 +210,17 @@ class FollowPath(MapPlugin, AbstractController):
         gap, turn = self._from_goal(pose, tracker)
         driven = tracker.on_last_section and tracker.remaining < 0.5 * AT_END
         self._turn_at_goal.update(driven and gap < self._turn_at_goal.limit, turn)
+
+    def _ends_here(self, pose: Pose, tracker: PathTracker) -> bool:
+        """Take the path for driven where it leads no nearer to a goal that is within its tolerance, and turn."""
+        nearly = tracker.has_arrived(self._dist_tolerance + CUSP_REACHED) and tracker.on_last_section
+        is_over = self._turn_at_goal.is_turning or self.ended_early
+        if is_over or not nearly or self._from_goal(pose, tracker)[0] > self._dist_tolerance:
+            return False
+        tracker.end()
+        self.ended_early = True
+        self._turn_at_goal.begin_within(self._dist_tolerance)
+        return True
 
     def _angle_left(self, pose: Pose, tracker: PathTracker) -> float:
         """Angle [rad] to the goal's heading at the end of the path, else to the point ahead on it."""

@@ -24,7 +24,8 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import FloatArray, Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.failures import stands
-from mbf_abstract.maps.controllers.follow_path import FollowPath, FollowPathParameters
+from mbf_abstract.maps.controllers.follow_path import FollowPath
+from mbf_abstract.maps.controllers.follow_path_parameters import FollowPathParameters
 from mbf_abstract.maps.controllers.standing import Standing, StandingParameters
 from mbf_abstract.maps.controllers.tight_places import HEADINGS
 from mbf_abstract.maps.map_plugin import MapContext
@@ -101,9 +102,13 @@ class KeepingToPath:
         """Take over a path. Where the robot stood is remembered, however often it is planned anew."""
         self._follower.set_plan(path)
 
-    def update(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> None:
-        """Take over the progress, and the tolerances [m, rad] of the goal."""
-        self._follower.is_goal_reached(pose, dist_tolerance, angle_tolerance)
+    def update(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
+        """Take over the progress, and the tolerances [m, rad] of the goal.
+
+        Whether the robot has reached the goal as near as the path leads to it.
+        """
+        reached = self._follower.is_goal_reached(pose, dist_tolerance, angle_tolerance)
+        return reached and self._follower.ended_early
 
     def choose(
         self,

@@ -6,9 +6,9 @@ lies ``BEHIND``: the planner's manoeuvres or the map's recoveries (``back_up``, 
 stands on the path itself blocks all of it.
 
 Rule: where the wanted motion is blocked but the outline fits on the path ahead, the robot creeps close along the path,
-or turns to it on the spot. Else wider and wider curves to the same side are tried, then going straight on; instead of a
-turn on the spot to what lies ahead or abeam, creeping along such curves. In all this the robot may drive ``distance``
-[m] until it gets ahead on its path again.
+or turns on the spot to a point close ahead on it. Else wider and wider curves to the same side are tried, then going
+straight on; instead of a turn on the spot to what lies ahead or abeam, creeping along such curves. In all this the
+robot may drive ``distance`` [m] until it gets ahead on its path again.
 """
 
 from __future__ import annotations
@@ -135,6 +135,12 @@ def along_path(
             speed = -CREEPING if backward else CREEPING
             motions.append(Twist.planar(speed, wz=speed * curvature))
     return motions
+
+
+def angle_to_path(tracker: PathTracker, pose: Pose, backward: bool = False) -> float:
+    """Angle [rad] to the nearest of those points; one farther ahead may lie behind a corner."""
+    x, y = tracker.straight_on(NEAR[-1]).tolist()
+    return off_course(arc_to(pose, np.array([x, y, pose.z]))[0], backward)
 
 
 def closely_along_path(tracker: PathTracker, pose: Pose, backward: bool = False) -> list[Twist]:

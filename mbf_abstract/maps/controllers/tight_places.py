@@ -7,7 +7,8 @@ to the other side there. Nor where something stands on the path; samples lead ar
 Rule: a place is tight where the outline fits on the path, but has less than twice ``ROOM`` to move sideways in all; so
 is a cusp where the robot cannot turn, as a manoeuvre fits only as it was planned. Controllers keep to the path from
 ``REACH`` before such a place on, and closely from ``CLOSE_FROM`` on, so that the robot has come onto its path where the
-gap begins.
+gap begins. The end of a path is no tight place, as many a goal lies beside a wall; but it is one once the way to the
+point ahead was blocked so near before it.
 """
 
 from __future__ import annotations
@@ -48,6 +49,7 @@ class TightPlaces:
     def __init__(self) -> None:
         self._asked_at = -math.inf
         self._next = math.inf
+        self._end_is_tight = False
 
     def distance(self, tracker: PathTracker, reverses: bool, fits: Fits) -> float:
         """Length [m] along the path to the next tight place, whatever cusps lie between; inf = none within ``REACH``.
@@ -57,6 +59,8 @@ class TightPlaces:
         reverses : bool
             Whether the robot drives backward where the poses of the path look against its direction.
         """
+        if self._end_is_tight:
+            return 0.0
         if tracker.progress - self._asked_at >= KEPT:
             self._asked_at = tracker.progress
             lengths = np.arange(tracker.progress, min(tracker.progress + REACH, tracker.length), SPACING)
@@ -66,6 +70,15 @@ class TightPlaces:
             gap = float(lengths[first]) if is_tight else math.inf
             self._next = min(gap, _next_cusp(tracker, fits))
         return max(self._next - tracker.progress, 0.0)
+
+    def was_blocked(self, tracker: PathTracker) -> bool:
+        """Take note that the wanted motion was blocked; whether the rest of the path is tight, and was not before.
+
+        So near to its end a path that is not free to be cut may be free with its own headings only.
+        """
+        is_new = not self._end_is_tight and tracker.on_last_section and tracker.remaining <= CLOSE_FROM
+        self._end_is_tight = self._end_is_tight or is_new
+        return is_new
 
     @staticmethod
     def begin_next_stroke(tracker: PathTracker) -> bool:
@@ -125,7 +138,7 @@ def has_room(x: float, y: float, yaw: float, fits: Fits) -> bool:
 
 def outline_fits(plugin: MapPlugin, near: Pose, query: PlaceQuery) -> Fits:
     """The question to a plugin's map, for poses at the height and in the frame of the pose ``near``."""
-    check = plugin.navigation_map.pose_check(query)
+    check = plugin.navigation_map.path_check(query)
 
     def fits(x: float, y: float, yaw: float) -> bool:
         place = Pose.planar(x, y, yaw, near.z, near.frame_id, near.stamp)

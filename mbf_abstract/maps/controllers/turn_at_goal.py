@@ -2,7 +2,8 @@
 
 When to use: in controllers that turn on the spot at the goal. A robot that turns drifts, and its pose is noisy: with
 one limit it would go to and fro between both. While it turns it may be twice as far from the goal. If it then has the
-heading, but stands out of the tolerance, it drives again: only turning it would stand there for ever.
+heading, but stands out of the tolerance, it drives again: only turning it would stand there for ever. Where a turn may
+be free at the exact end of the path only, see ``end_of_path``.
 """
 
 from __future__ import annotations
@@ -36,6 +37,10 @@ class TurnAtGoal:
     def take_tolerances(self, dist_tolerance: float, angle_tolerance: float) -> None:
         """Take over the tolerances [m, rad] of the goal."""
         self._reach, self._angle_tolerance = min(self._reach, dist_tolerance), angle_tolerance
+
+    def begin_within(self, reach: float) -> None:
+        """Let a robot that comes no nearer turn where it stands, within a distance [m] of the goal."""
+        self._reach = reach
 
     @property
     def limit(self) -> float:

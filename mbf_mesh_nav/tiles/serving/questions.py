@@ -107,6 +107,16 @@ class TileQuestions(OutlinedMap):
 
         return check
 
+    def path_check(self, query: PlaceQuery) -> PlaceCheck:
+        """State of the ground below the robot's centre as planners look at it: LETHAL where it costs too much."""
+        now = self.moment()
+
+        def check(pose: Pose) -> PlaceAnswer:
+            there = now.places(pose.x, pose.y, OF_PLACES)
+            return OUTSIDE if there is None else there.check_on_path(pose)
+
+        return check
+
     def find_valid_pose(
         self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
     ) -> PoseAnswer:

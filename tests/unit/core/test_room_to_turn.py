@@ -12,6 +12,7 @@ from mbf_abstract.maps.controllers.room_to_turn import (
     CREEPING,
     RoomToTurn,
     along_path,
+    angle_to_path,
     curves_ahead,
     poses_ahead,
     wider_curves,
@@ -138,3 +139,14 @@ def test_the_poses_ahead_are_those_of_a_robot_on_the_path(backward):
 
 def test_a_robot_that_looks_elsewhere_does_not_creep_along_its_path():
     assert along_path(quarter_circle(False), Pose.planar(0.0, 0.0, 2.0)) == []
+
+
+@pytest.mark.parametrize("backward", [False, True])
+def test_the_angle_to_the_path_is_that_to_a_point_close_ahead_not_round_the_corner(backward):
+    points = [(0.05 * k, 0.0) for k in range(3)] + [(0.1, 0.05 * k) for k in range(1, 20)]
+    along = [0.0, 0.0, 0.5 * math.pi, *[0.5 * math.pi] * 19]
+    poses = [Pose.planar(x, y, yaw + math.pi * backward) for (x, y), yaw in zip(points, along, strict=True)]
+    tracker = PathTracker(Path.from_poses(poses), dimensions=2)
+    tracker.update((0.0, 0.0))
+    here = Pose.planar(0.0, 0.0, 0.4 + math.pi * backward)
+    assert angle_to_path(tracker, here, backward) == pytest.approx(-0.4)

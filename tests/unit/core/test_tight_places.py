@@ -114,3 +114,15 @@ def test_an_answer_holds_until_the_robot_has_come_on():
     tracker.update((0.5 + 1.1 * KEPT, 0.0))
     places.distance(tracker, True, fits)
     assert len(asked) > before
+
+
+@pytest.mark.parametrize(("at", "is_tight"), [(2.9, False), (3.1, True)])
+def test_once_the_way_was_blocked_near_its_end_the_rest_of_a_path_is_tight(at, is_tight):
+    places, tracker = TightPlaces(), tracker_at(at)
+    assert places.was_blocked(tracker) == is_tight
+    assert not places.was_blocked(tracker), "it is said once"
+    assert places.distance(tracker, True, lambda x, y, yaw: True) == (0.0 if is_tight else math.inf)
+
+
+def test_a_way_that_was_blocked_before_a_cusp_says_nothing_of_the_end():
+    assert not TightPlaces().was_blocked(out_and_back(0.9))

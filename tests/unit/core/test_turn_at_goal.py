@@ -33,3 +33,12 @@ def test_a_goal_on_another_storey_is_as_far_away_as_it_is(z, same_storey, gap):
     assert from_goal(Pose.planar(1.0, 2.0, 0.2), Pose.planar(4.0, 2.0, 0.5, z), same_storey) == pytest.approx(
         (gap, 0.3)
     )
+
+
+def test_one_that_comes_no_nearer_turns_where_it_is_within_the_tolerance():
+    state = TurnAtGoal(0.05)
+    state.take_tolerances(0.1, 0.2)
+    assert not state.update(0.08 <= state.limit, 1.0)
+    state.begin_within(0.1)
+    state.take_tolerances(0.1, 0.2)
+    assert state.update(0.08 <= state.limit, 1.0)

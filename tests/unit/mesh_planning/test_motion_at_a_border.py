@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.maps.queries import AS_CONFIGURED, CellState
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
 EDGE, SIDE = 0.1, 6.0
@@ -56,3 +57,17 @@ def test_on_a_slope_the_border_is_where_it_is_on_level_ground():
     uphill = Pose(tuple(there.tolist()), Pose.planar(0.0, 0.0, 0.5 * math.pi + 0.05).orientation)
     assert slope.obstacle_ahead(uphill, FORWARD, 1.0)
     assert slope.obstacle_on_path(uphill, FORWARD, 1.0) == ""
+
+
+@pytest.mark.parametrize(("off", "touches"), [(0.02, False), (-0.02, True)])
+def test_what_lies_ahead_is_touched_where_the_vertex_itself_is_within_the_radius(plain, paint, off, touches):
+    paint(plain, lambda v: np.where((abs(v[:, 0] - 3.0) < 0.01) & (abs(v[:, 1] - 5.0) < 0.01), np.inf, 0.0))
+    there = Pose.planar(3.0, 4.5 - off, 0.5 * math.pi)
+    assert bool(plain.obstacle_on_path(there, FORWARD, 0.5)) == touches, "its ground begins half an edge before it"
+
+
+def test_on_its_path_a_robot_fits_where_planners_let_its_centre(plain, paint):
+    paint(plain, lambda v: np.where(v[:, 1] > 5.05, np.inf, np.where(v[:, 1] > 4.85, 1.0, 0.0)))
+    check = plain.path_check(AS_CONFIGURED)
+    states = [check(Pose.planar(3.0, y)).state for y in (4.5, 4.83, 4.87, 5.2, 7.0)]
+    assert states == [CellState.FREE, CellState.FREE, CellState.LETHAL, CellState.LETHAL, CellState.OUTSIDE]

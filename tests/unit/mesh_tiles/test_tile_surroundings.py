@@ -9,7 +9,7 @@ from test_tile_server import config, planned, pose, serve
 from tiled_terrains import SPACING, WholeMap, settings
 
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_abstract.maps.queries import AS_CONFIGURED, CellState, PlaceQuery
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_abstract.testing.loopback import LoopbackSession
@@ -174,9 +174,11 @@ def test_a_robot_off_the_surface_gets_the_answers_of_the_whole_mesh(tiled, whole
     whole, forward = whole_hills.map, Twist.planar(vx=0.5)
     whole.inscribed_radius = tiled.inscribed_radius
     place = whole_hills.free_places(1, 15)[0]
+    assert tiled.path_check(AS_CONFIGURED)(pose(place)) == whole.path_check(AS_CONFIGURED)(pose(place))
     for there in (*(pose(place + np.array([0.0, 0.0, up])) for up in (0.8, 5.0)), Pose.planar(-300.0, 0.0)):
         assert tiled.obstacle_ahead(there, forward, 1.0) == whole.obstacle_ahead(there, forward, 1.0)
         assert tiled.obstacle_on_path(there, forward, 1.0) == whole.obstacle_on_path(there, forward, 1.0)
+        assert tiled.path_check(AS_CONFIGURED)(there) == whole.path_check(AS_CONFIGURED)(there)
         assert tiled.nearest_obstacle(there, 9.0) == pytest.approx(whole.nearest_obstacle(there, 9.0))
 
 
