@@ -15,9 +15,9 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbf_abstract.execution.path_cusps import find_cusps, points_along
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
+from mbf_abstract.geometry.path_cusps import find_cusps, points_along
 from mbf_abstract.geometry.polyline import polyline_lengths, reverse_segments
 from mbf_abstract.geometry.transform import Transform
 

@@ -79,8 +79,7 @@ class RegulatedPurePursuitController(RegulatedFollower):
             return cycle
         motions = self._motions(cycle)
         result = self._checked(cycle, motions)
-        drives_otherwise = result.success and result.command != motions[0] and motions[0].vx != 0.0
-        if drives_otherwise and self._tight_places.was_blocked(cycle.tracker):
+        if not self._at_goal and self._tight_places.drives_otherwise(cycle.tracker, motions[0], result.command):
             return self.compute_velocity_commands(request)
         blocked = result.outcome == ExePathOutcome.BLOCKED_PATH
         if blocked and self.tracker and self._tight_places.begin_next_stroke(self.tracker):
@@ -115,6 +114,8 @@ class RegulatedPurePursuitController(RegulatedFollower):
         close = closely_along_path(cycle.tracker, cycle.request.pose, backward)
         if close:
             self.tracker.cusp_reached = CLOSELY
+        elif self._tight_places.is_close(cycle.tracker):
+            return [self._turn(cycle, angle_to_path(cycle.tracker, cycle.request.pose, backward))]
         return [self._slowed(motion, cycle.request.velocity) for motion in close]
 
     def _slowed(self, motion: Twist, velocity: Twist) -> Twist:

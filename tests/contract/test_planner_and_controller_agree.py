@@ -38,7 +38,7 @@ REFUSED = (
 """Drives on the costmap that were refused twice at one place."""
 REFUSED_ON_MESHES = (
     ("dijkstra", "follow_path", 307), ("cvp", "follow_path", 315), ("dijkstra", "follow_path", 323),
-    ("any_angle", "follow_path", 336),
+    ("any_angle", "follow_path", 336), ("cvp", "follow_path", 375),
 )  # fmt: skip
 """The same on the mesh; the first goes through a passage of one vertex, the third to a goal at the end of another."""
 AT_LIMITS = (

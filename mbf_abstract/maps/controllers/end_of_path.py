@@ -1,11 +1,11 @@
 """Turning at the end of a path where that may be free only exactly there.
 
 When to use: in controllers that turn on the spot to the goal's heading, on all maps. A planner has looked at the turn
-at its goal. A robot that stands a centimetre beside it may touch something half-way around, and there it can neither
-turn on nor drive on. When not: round robots, which can turn wherever they stand.
+at its goal. A robot that turns a centimetre beside it may touch something half-way, and there it can neither turn nor
+drive on. When not: round robots, which can turn wherever they stand.
 
 Rule: the whole turn is looked at before it begins. Where it is not free the robot creeps on to the exact end of the
-path, and looks again; there, it turns the other way around, if that is free.
+path, and looks again; there, it turns to the other side, if that is free.
 """
 
 from __future__ import annotations

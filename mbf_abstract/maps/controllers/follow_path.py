@@ -117,7 +117,8 @@ class FollowPath(MapPlugin, AbstractController):
             )
         except TransformError as error:
             return ControlResult(ExePathOutcome.TF_ERROR, str(error))
-        if command not in (None, motions[0]) and motions[0].vx != 0.0 and self._tight_places.was_blocked(tracker):
+        turns = self._turn_at_goal.is_turning
+        if not turns and self._tight_places.drives_otherwise(tracker, motions[0], command):
             return self.compute_velocity_commands(request)
         if obstacle and (self._tight_places.begin_next_stroke(tracker) or self._ends_here(pose, tracker)):
             return self.compute_velocity_commands(request)
@@ -151,6 +152,8 @@ class FollowPath(MapPlugin, AbstractController):
         if self.to_tight_place(pose) <= CLOSE_FROM and (close := closely_along_path(tracker, pose, backward)):
             tracker.cusp_reached = CLOSELY
             return close
+        if self._tight_places.is_close(tracker):
+            return [self._turn(angle_to_path(tracker, pose, backward))]
         if abs(error) > p.rotate_to_heading_min_angle:
             return curves_ahead(self._turn(error), error, backward)
         left = max(tracker.to_cusp, gap if tracker.on_last_section else 0.0)

@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.geometry import FloatArray, Pose
+from mbf_abstract.geometry import Command, FloatArray, Pose, Twist
 from mbf_abstract.geometry.arithmetic import arctan2
 from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.queries import CellState, PlaceQuery
@@ -49,7 +49,7 @@ class TightPlaces:
     def __init__(self) -> None:
         self._asked_at = -math.inf
         self._next = math.inf
-        self._end_is_tight = False
+        self._close_until = -math.inf
 
     def distance(self, tracker: PathTracker, reverses: bool, fits: Fits) -> float:
         """Length [m] along the path to the next tight place, whatever cusps lie between; inf = none within ``REACH``.
@@ -59,7 +59,7 @@ class TightPlaces:
         reverses : bool
             Whether the robot drives backward where the poses of the path look against its direction.
         """
-        if self._end_is_tight:
+        if self.is_close(tracker):
             return 0.0
         if tracker.progress - self._asked_at >= KEPT:
             self._asked_at = tracker.progress
@@ -71,14 +71,25 @@ class TightPlaces:
             self._next = min(gap, _next_cusp(tracker, fits))
         return max(self._next - tracker.progress, 0.0)
 
-    def was_blocked(self, tracker: PathTracker) -> bool:
-        """Take note that the wanted motion was blocked; whether the rest of the path is tight, and was not before.
+    def drives_otherwise(self, tracker: PathTracker, wanted: Twist, command: Command | None) -> bool:
+        """Take note of what is driven instead of a wanted motion; whether the motions are to be chosen anew, closely.
 
-        So near to its end a path that is not free to be cut may be free with its own headings only.
+        Near its end a path that is not free to be cut may be free with its own headings only. And a robot that turns
+        to its path on the spot must not turn back to a point farther ahead, before it has come on.
         """
-        is_new = not self._end_is_tight and tracker.on_last_section and tracker.remaining <= CLOSE_FROM
-        self._end_is_tight = self._end_is_tight or is_new
+        if not isinstance(command, Twist) or command == wanted:
+            return False
+        if command.vx == 0.0:
+            self._close_until = max(self._close_until, tracker.progress + KEPT)
+            return False
+        near_end = wanted.vx != 0.0 and tracker.on_last_section and tracker.remaining <= CLOSE_FROM
+        is_new = near_end and self._close_until < math.inf
+        self._close_until = math.inf if near_end else self._close_until
         return is_new
+
+    def is_close(self, tracker: PathTracker) -> bool:
+        """Whether a robot on the path, or beside it, keeps to it closely for what it drove before."""
+        return tracker.progress < self._close_until
 
     @staticmethod
     def begin_next_stroke(tracker: PathTracker) -> bool:

@@ -44,7 +44,7 @@ def test_at_the_end_or_where_the_goal_is_not_ahead_it_only_turns(x, yaw):
 
 
 @pytest.mark.parametrize(("turn", "rate", "left"), [(1.0, 0.5, 1.0), (1.0, -0.5, 2 * math.pi - 1.0), (-1.0, -1.8, 1.0)])
-def test_a_turn_goes_on_to_the_heading_whichever_way_around(turn, rate, left):
+def test_a_turn_goes_on_to_the_heading_to_either_side(turn, rate, left):
     assert turn_left(turn, turning(rate)) == pytest.approx(left)
 
 

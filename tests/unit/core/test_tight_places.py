@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.maps.controllers.tight_places import KEPT, REACH, ROOM, TightPlaces
 
 LINE = [(0.1 * k, 0.0, 0.0) for k in range(41)]
@@ -116,13 +116,26 @@ def test_an_answer_holds_until_the_robot_has_come_on():
     assert len(asked) > before
 
 
+WANTED, CURVE, TURN = Twist.planar(0.5, wz=0.3), Twist.planar(0.1, wz=0.2), Twist.planar(wz=0.4)
+
+
 @pytest.mark.parametrize(("at", "is_tight"), [(2.9, False), (3.1, True)])
 def test_once_the_way_was_blocked_near_its_end_the_rest_of_a_path_is_tight(at, is_tight):
     places, tracker = TightPlaces(), tracker_at(at)
-    assert places.was_blocked(tracker) == is_tight
-    assert not places.was_blocked(tracker), "it is said once"
+    assert not places.drives_otherwise(tracker, WANTED, WANTED) and not places.drives_otherwise(tracker, WANTED, None)
+    assert places.drives_otherwise(tracker, WANTED, CURVE) == is_tight
+    assert not places.drives_otherwise(tracker, WANTED, CURVE), "it is said once"
     assert places.distance(tracker, True, lambda x, y, yaw: True) == (0.0 if is_tight else math.inf)
 
 
-def test_a_way_that_was_blocked_before_a_cusp_says_nothing_of_the_end():
-    assert not TightPlaces().was_blocked(out_and_back(0.9))
+def test_a_way_that_was_blocked_before_a_cusp_or_a_turn_says_nothing_of_the_end():
+    assert not TightPlaces().drives_otherwise(out_and_back(0.9), WANTED, CURVE)
+    assert not TightPlaces().drives_otherwise(tracker_at(3.5), TURN, CURVE)
+
+
+def test_a_robot_that_turns_to_its_path_keeps_to_it_closely_until_it_has_come_on():
+    places, tracker = TightPlaces(), tracker_at(1.0)
+    assert not places.drives_otherwise(tracker, WANTED, TURN)
+    assert places.is_close(tracker) and places.distance(tracker, True, lambda x, y, yaw: True) == 0.0
+    tracker.update((1.01 + KEPT, 0.0))
+    assert not places.is_close(tracker) and places.distance(tracker, True, lambda x, y, yaw: True) == math.inf
