@@ -33,6 +33,8 @@ FIRST_MARGIN = 0.02
 """How far above the least estimate a portal's may be to be opened at first."""
 LEAST_WIDENING = 0.01
 """What is added to twice that margin to widen a corridor."""
+EDGES_OF_A_STEP = 16.0
+"""Step of the exact search's work lists in mean edges: a corridor has millions of vertices, so the lists are long."""
 STEADY = 0.005
 """A corridor is wide enough if a wider one makes the path by no larger a share cheaper."""
 
@@ -188,7 +190,7 @@ class CorridorSearch:
             distances[seeds], predecessors[seeds] = self._start.corner_costs, -1
         vertices = pool.vertices[: len(distances)]
         vertices.flags.writeable = False
-        step = self._tiled.tile(self._start.key)[1].mean_edge
+        step = EDGES_OF_A_STEP * self._tiled.tile(self._start.key)[1].mean_edge
         offsets = self._goal.corner_costs
         search = graph, distances, predecessors, seeds, step, targets, offsets, self._cancel_flag
         if not propagate_distances(*search, (vertices, self._goal.point)):
