@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw
 from mbf_abstract.goals.arrival_tolerance import ends_beside, not_even_beside
+from mbf_abstract.maps.getting_free import getting_free
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
@@ -87,6 +88,8 @@ class HybridAStarPlanner(CostmapPlanner):
         world = self._world(request)
         legs: list[CarLeg] = []
         failure = _misfit(world, "start", request.start)
+        if failure is not None and failure.outcome == GetPathOutcome.BLOCKED_START:
+            failure = replace(failure, message=f"{failure.message}; {getting_free(self.costmap, request.start)}")
         for number, (start, goal) in enumerate(pairwise((request.start, *request.via, request.goal))):
             is_last = number == len(request.via)
             tolerance = request.dist_tolerance if is_last else 0.0

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.arrival_tolerance import ends_beside, not_even_beside
+from mbf_abstract.maps.getting_free import getting_free
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import PlanRequest, PlanResult
@@ -159,7 +160,8 @@ class GridPlanner(CostmapPlanner):
         if cell is None:
             return off_map(grid.costmap, start, "start")
         if grid.is_blocked(cell):
-            return PlanResult(GetPathOutcome.BLOCKED_START, _blocked(grid, "start", start, cell))
+            text = f"{_blocked(grid, 'start', start, cell)}; {getting_free(self.costmap, start)}"
+            return PlanResult(GetPathOutcome.BLOCKED_START, text)
         return None
 
 

@@ -72,6 +72,19 @@ def test_a_configuration_says_itself_what_unknown_is(tmp_path):
     assert result.exit_code == 2 and "track_unknown_space" in result.stderr
 
 
+def test_a_bare_map_is_checked_with_the_configuration_of_plan(half_known, hill):
+    for file, backend in ((half_known, "costmap"), (hill, "mesh")):
+        result = mbf("check", file)
+        assert result.exit_code == 0 and f"good; backend {backend}" in result.stdout, result.stderr
+    assert "2000 cells (10 %) are unknown" in mbf("check", half_known).stdout
+
+
+def test_a_robot_is_no_configuration_and_the_command_that_shows_it_is_named(tmp_path):
+    (tmp_path / "bot.urdf").write_text("<robot name='b'><link name='base_link'/></robot>")
+    result = mbf("check", tmp_path / "bot.urdf")
+    assert result.exit_code == 2 and "got a robot (mbf robot show bot.urdf" in result.stderr
+
+
 @pytest.mark.parametrize("unknown", [FREE, LETHAL])
 def test_a_mesh_has_no_unknown_cells(hill, unknown):
     result = mbf("plan", hill, "--start", 2, 2, "--goal", 9, 9, *unknown)

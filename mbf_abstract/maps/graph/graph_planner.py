@@ -13,13 +13,13 @@ import numpy as np
 from mbf_abstract.geometry import FloatArray, Path, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.goals.arrival_tolerance import ends_beside, not_even_beside
+from mbf_abstract.maps.getting_free import getting_free
 from mbf_abstract.maps.graph.graph_map import BoolArray, GraphMap
 from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult
 
-START, GOAL = GetPathOutcome.BLOCKED_START, GetPathOutcome.BLOCKED_GOAL
 OFF_GROUND = 0.5
 """A pose farther above or below the ground [m] is not on it."""
 
@@ -81,7 +81,10 @@ class GraphPlanner(AbstractPlanner):
             height = float(self._map.nodes[node, 2])
             text = f"{place} is {abs(pose.z - height):.2f} m from the ground, which is at z = {height:.2f} m"
             return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{text}; allowed are {OFF_GROUND:g} m")
-        return PlanResult(START if name == "start" else GOAL, f"{place} is {answer.state.name}, cost {answer.cost:.2f}")
+        text = f"{place} is {answer.state.name}, cost {answer.cost:.2f}"
+        if name != "start":
+            return PlanResult(GetPathOutcome.BLOCKED_GOAL, text)
+        return PlanResult(GetPathOutcome.BLOCKED_START, f"{text}; {getting_free(self._map, pose)}")
 
     def _graph(self, free: BoolArray) -> Any:
         """Sparse matrix of what an edge between free nodes costs: its length, longer by the costs."""
