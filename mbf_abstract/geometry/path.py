@@ -23,7 +23,9 @@ from mbf_abstract.geometry.rotations import (
 
 def _refuse_wrong_pose(positions: FloatArray, orientations: FloatArray, squared_norms: FloatArray) -> None:
     """Name the first pose of a path that is not finite, or else the first whose quaternion is not of unit length."""
-    infinite = ~(np.isfinite(positions).all(axis=1) & np.isfinite(orientations).all(axis=1))
+    infinite = ~np.isfinite(positions).all(axis=1)
+    if not infinite.any():  # else it has made the headings of its neighbours what they are
+        infinite = ~np.isfinite(orientations).all(axis=1)
     if infinite.any():
         i = int(np.argmax(infinite))
         raise NonFiniteError(f"pose {i} of the path is not finite: {positions[i].tolist()} {orientations[i].tolist()}")

@@ -65,6 +65,20 @@ def test_a_lie_becomes_a_failure_that_names_it(lie, outcome, text):
         assert_next_goals_work(session)
 
 
+@pytest.mark.parametrize("error", [RuntimeError("no tile"), KeyError("map")])
+def test_a_map_that_cannot_say_whether_a_path_leaves_it_is_named(error, monkeypatch):
+    def failing(path):
+        raise error
+
+    with ScriptedSession() as session:
+        monkeypatch.setattr(session.server, "path_problem", failing)
+        result = session.navigator.get_path(Pose.planar(3.0, 0.0))
+        assert (result.outcome, result.path) == (GetPathOutcome.INTERNAL_ERROR, None)
+        assert f"path_problem raised {type(error).__name__}" in result.message
+        monkeypatch.undo()
+        assert_next_goals_work(session)
+
+
 def test_an_outcome_of_another_action_does_not_pass_as_success():
     with ScriptedSession(planner_max_retries=0) as session:
         session.planner.play(PlanResult(999, "strange"))
