@@ -126,6 +126,7 @@ FAULTS = {
         "a_blocked_goal_is_named",
         "a_goal_where_the_robot_would_touch_something_is_blocked",
         "a_tolerance_reaches_past_the_border",
+        "a_tolerance_that_does_not_help_is_named",
     },
     refines_by_cutting_the_end: {
         "a_refined_path_keeps_its_ends_and_is_no_longer",
