@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from urllib.parse import quote
 
 from terrain.sweeps.statistics import Row
@@ -45,6 +46,12 @@ def html_table(rows: Sequence[Row]) -> str:
     decimals = {} if "metric" in rows[0] else {name: decimals_of([row[name] for row in rows]) for name in names}
     body = "".join(_line(row, names, decimals) for row in rows)
     return f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'
+
+
+def inline_svg(file: Path) -> str:
+    """Return a figure that is an SVG file as a part of a page."""
+    svg = file.read_text("utf-8")
+    return f"<div>{svg[svg.index('<svg') :]}</div>"
 
 
 def decimals_of(values: Iterable[object]) -> int:

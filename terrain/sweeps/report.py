@@ -1,8 +1,8 @@
 """The results of a sweep as files: tables of runs, medians and tests, figures, a table for a paper, a page to read.
 
 ``sweep.csv`` (and ``sweep.parquet``, if pyarrow is installed) has a row per run, ``summary.csv`` one per variant and
-metric, ``tests.csv`` one per test of two variants; ``sweep.tex`` is a table for a paper, ``boxplots`` and ``tracks``
-are figures, as PDF and SVG. ``sweep.html`` shows everything, with a link to every run that was kept.
+metric, ``tests.csv`` one per test of two variants; ``sweep.tex`` is a table for a paper, ``boxplots``, ``difficulty``
+and ``tracks`` are figures, as PDF and SVG. ``sweep.html`` shows everything, with a link to every run that was kept.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 from mbf_abstract.whole_files import replacing, write_whole
 from terrain.recording.verdict import Level
 from terrain.sweeps.figures import write_figures
-from terrain.sweeps.html_tables import html_page, html_table
+from terrain.sweeps.html_tables import html_page, html_table, inline_svg
 from terrain.sweeps.latex import latex_table
 from terrain.sweeps.statistics import METRICS, Row, compare_variants, rate_of, spread_of, values_of
 from terrain.sweeps.variants import AS_WRITTEN, common_settings, short_names
@@ -189,7 +189,7 @@ def _page(
     shared = ", ".join(common_settings(list(names)))
     parts = [f"<p>All variants have {html.escape(shared)}.</p>" if shared else ""]
     parts += [html_table(_named(summarise(table), names)) if table else ""]
-    parts += [_inline(figure.read_text("utf-8")) for figure in figures]
+    parts += [inline_svg(figure) for figure in figures]
     if spreads:
         parts += ["<h2>Medians, quartiles and 95 % intervals</h2>", html_table(_named(spreads, names))]
     if tests:
@@ -213,8 +213,3 @@ def _reordered(row: Row) -> dict[str, Any]:
     """A row as a reader wants it: link and verdict first, without what the verdict and the colour say already."""
     first = ("variant", "seed", "folder", "verdict")  # at the end of a wide table they are not found
     return {**{name: row[name] for name in first}, **{name: row[name] for name in row if name not in IN_THE_VERDICT}}
-
-
-def _inline(svg: str) -> str:
-    """A figure as a part of a page."""
-    return f"<div>{svg[svg.index('<svg') :]}</div>"

@@ -17,10 +17,13 @@ from terrain.commands.verdict_line import TERMINAL_COLOURS
 from terrain.experiments.evaluation.entrant import entrant
 from terrain.experiments.evaluation.joining import join
 from terrain.experiments.evaluation.leaderboard import page, settings_text, standings, terminal_table
+from terrain.experiments.evaluation.levels import curves_of_levels
 from terrain.experiments.evaluation.protocol import Entry, Protocol
 from terrain.experiments.evaluation.results import described, read_results, results_of, shipped_results, write_results
 from terrain.experiments.evaluation.trials import run_trials
 from terrain.recording.verdict import Level
+from terrain.sweeps.figures import write_difficulty
+from terrain.sweeps.html_tables import inline_svg
 
 ALL_SHIPPED = "all"
 
@@ -56,7 +59,9 @@ def bench(protocol: Protocol, asked: Asked) -> None:
     title = f"mbf bench {protocol.title}"
     own = {entry.name for entry in entries if entry.name not in protocol.entries}
     about = [*_about(results.head), *table.origins]
-    write_whole(asked.out / "leaderboard.html", page(title, about, table.rows, lines, own, table.entries))
+    figures = write_difficulty(curves_of_levels(table.rows, [line.entry for line in lines]), asked.out)
+    curves = "".join(inline_svg(file) for file in figures if file.suffix == ".svg")
+    write_whole(asked.out / "leaderboard.html", page(title, about, table.rows, lines, own, table.entries, curves))
     if asked.as_json:
         typer.echo(json.dumps({**results.head, "standings": [vars(line) for line in lines]}))
         return
@@ -70,7 +75,8 @@ def bench(protocol: Protocol, asked: Asked) -> None:
         if line.entry in own and line.reason:
             text = f"{line.entry} fails most often with: {line.reason}"
             console.print(well_formed(text), markup=False, highlight=False, soft_wrap=True)
-    console.print(f"results in {asked.out}: results.json, leaderboard.html", markup=False, soft_wrap=True)
+    names = ", ".join(["results.json", "leaderboard.html", *(file.name for file in figures)])
+    console.print(f"results in {asked.out}: {names}", markup=False, soft_wrap=True)
 
 
 def _entries(protocol: Protocol, asked: Asked) -> list[Entry]:

@@ -169,6 +169,7 @@ def page(
     lines: Sequence[Standing],
     entrants: set[str],
     entries: Mapping[str, Mapping[str, Any]],
+    curves: str = "",
 ) -> str:
     """Return the leaderboard as a page that needs no other file.
 
@@ -180,10 +181,12 @@ def page(
         Whose line is marked, and whose failures are listed.
     entries : mapping
         Map and settings of every line.
+    curves : str
+        The figure of difficulty curves as SVG; empty for none.
     """
     parts = [f"<p>{html.escape(text)}</p>" for text in about]
     parts += [html_table([_page_line(line, line.entry in entrants, _counts(lines)) for line in lines])]
-    parts += ["<h2>Arrived, by world</h2>", html_table(_by_world(rows, lines))]
+    parts += ["<h2>Arrived, by world</h2>", curves, html_table(_by_world(rows, lines))]
     settings = [
         {"entry": line.entry, "map": entries[line.entry]["backend"], "settings": settings_text(entries[line.entry])}
         for line in lines
