@@ -23,7 +23,7 @@ from terrain.viewer.replay.scene_content import PLAIN, Looks, duration, scene_co
 
 PAGE = Path(__file__).resolve().parent / "page"
 SCRIPTS = (
-    *("maths", "data", "shaders", "drawing", "camera", "world", "bodies", "lines"),
+    *("maths", "data", "shaders", "drawing", "pace", "camera", "world", "bodies", "lines"),
     *("labels", "panel", "player", "colours", "main"),
 )
 MOST_NAME = 80  # characters of a name in the title

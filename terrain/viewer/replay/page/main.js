@@ -2,6 +2,8 @@
 const STORE = id => JSON.parse(document.getElementById(id).textContent);
 const CUT_SHARE = 0.7, CUT_HEIGHT = 2.0;  // above the robot's floor: of a storey's height, at most [m]
 const ALL = 1e9;
+const SETTLED = 150;  // ms without motion until a picture is drawn sharp
+const MOST_STEP = 1;  // s of a run's time that passes at most from a frame to the next, before its speed
 const LEAST_TILT = 1000;  // thousandths of a degree; a robot that never tilts as much has nothing to say about it
 
 class Replay {
@@ -9,9 +11,12 @@ class Replay {
     this.scene = scene;
     this.canvas = document.querySelector('canvas');
     this.drawing = new Drawing(this.canvas);
+    this.pace = new Pace(this.drawing.gl);
     this.dirty = true;
+    this.coarse = false;  // whether the picture that is shown is one of a moving scene
+    this.seen = true;
     const changed = () => { this.dirty = true; };
-    this.player = new Player(run, changed);
+    this.player = new Player(run, changed, this.pace.software);
     this.panel = new Panel(run, at => this.player.jump(at));
     this.world = new World(this.drawing, scene, arrays);
     this.bodies = new Bodies(this.drawing, scene, arrays);
@@ -46,7 +51,16 @@ class Replay {
     document.getElementById('panel-button').addEventListener('click', () => this.togglePanel());
     if (matchMedia('(max-width: 720px), (max-height: 420px)').matches || window.self !== window.top) this.togglePanel();
     document.addEventListener('keydown', event => this.key(event));
-    new ResizeObserver(() => { if (!this.camera.touched) this.fit(); this.dirty = true; }).observe(this.canvas);
+    new IntersectionObserver(entries => { this.seen = entries[entries.length - 1].isIntersecting; }).observe(this.canvas);
+    new ResizeObserver(() => this.resized()).observe(this.canvas);
+  }
+
+  // An observer calls at its beginning, too, when this size has been drawn.
+  resized() {
+    const size = [this.canvas.clientWidth, this.canvas.clientHeight].join();
+    if (this.shown === size) return;
+    if (!this.camera.touched) this.fit();
+    this.dirty = true;
   }
 
   fit() { if (this.camera.view !== 'follow') { this.camera.show(this.camera.view); this.camera.blend = 0; } }
@@ -104,19 +118,31 @@ class Replay {
     return above === undefined ? ALL : floors[at] + Math.min(CUT_SHARE * (above - floors[at]), CUT_HEIGHT);
   }
 
+  // Nothing moves, and nothing is drawn, while the page's part of a window is not seen.
   tick(now) {
-    const seconds = clamped((now - this.last) / 1000, 0, 0.2);
-    this.last = now;
-    this.player.advance(seconds);
-    if (this.dirty && this.canvas.clientWidth && !document.hidden) this.draw(seconds);
+    const seconds = clamped((now - this.last) / 1000, 0, MOST_STEP), {pace} = this;
+    if (this.begun) pace.note(this.begun, now);
+    this.begun = 0;  // a frame of a moving scene
     requestAnimationFrame(next => this.tick(next));
+    if (!this.canvas.clientWidth || document.hidden || !this.seen) this.last = now;
+    else if (now >= pace.ready) {
+      this.last = now;
+      this.player.advance(seconds);
+      if (this.dirty) {
+        this.moved = now;
+        this.begun = this.used ? now : 0;
+        this.draw(seconds, this.used ? pace.sharpness : 1);
+      } else if (this.coarse && now > this.moved + SETTLED) this.draw(seconds, 1);
+    }
   }
 
-  draw(seconds) {
+  draw(seconds, sharpness) {
     const {drawing, camera, bodies, world, player} = this, gl = drawing.gl;
-    const ratio = Math.min(devicePixelRatio || 1, 2);
+    const ratio = Math.min(devicePixelRatio || 1, 2) * sharpness;
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map(side => Math.round(side * ratio));
     if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, {width, height});
+    this.shown = [this.canvas.clientWidth, this.canvas.clientHeight].join();
+    this.coarse = sharpness < 1;
     drawing.begin();
     bodies.place(player.time, camera, this.robot);
     if (this.robot) camera.follow(this.robot, player.jumped ? Infinity : seconds * Number(player.speeds.value));

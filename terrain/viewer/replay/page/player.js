@@ -7,7 +7,8 @@ const KEYS = [['space', 'play, pause'], ['← →', '1 s back, ahead; with shift
   ['drag', 'turn; right button or two fingers: shift'], ['wheel, pinch', 'zoom']];
 
 class Player {
-  constructor(run, onChange) {
+  // It plays at once, but not for those who want no motion, nor in a page around it that could not be read meanwhile.
+  constructor(run, onChange, software) {
     this.run = run;
     this.onChange = onChange;
     this.bar = document.getElementById('time');
@@ -16,7 +17,8 @@ class Player {
     this.speeds = document.getElementById('speed');
     for (const speed of SPEEDS) this.speeds.add(new Option(speed + ' ×', speed));
     this.speeds.value = SPEEDS.find(speed => speed >= 1 && this.end / speed <= LONGEST) || SPEEDS[SPEEDS.length - 1];
-    this.playing = this.end > 0 && !matchMedia('(prefers-reduced-motion: reduce)').matches;
+    const calm = matchMedia('(prefers-reduced-motion: reduce)').matches || (software && window.self !== window.top);
+    this.playing = this.end > 0 && !calm;
     this.bar.addEventListener('input', () => this.seek(Number(this.bar.value)));
     document.getElementById('play').addEventListener('click', () => this.toggle());
     this.show();

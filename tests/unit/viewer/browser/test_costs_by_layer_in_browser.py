@@ -11,7 +11,9 @@ from terrain.recording.recorded_maps import RecordedLayer, RecordedMesh
 from terrain.viewer.pictures.colours import WALL
 from terrain.viewer.replay.replay_page import replay_html
 
-READY = "window.replay !== undefined && window.replay.used !== undefined && !window.replay.dirty"
+READY = (
+    "window.replay !== undefined && window.replay.used !== undefined && !window.replay.dirty && !window.replay.coarse"
+)
 
 
 @pytest.fixture
@@ -65,7 +67,7 @@ def test_a_run_without_layers_offers_no_colours(chromium, hill_recording, tmp_pa
 
     async def watch(page):
         await page.open((tmp_path / "replay.html").as_uri())
-        await page.wait_for(READY.replace("!window.replay.dirty", "true"))
+        await page.wait_for(READY.replace("!window.replay.dirty && !window.replay.coarse", "true"))
         await page.key("c")
         return page.errors, await page.evaluate(
             "document.getElementById('colours').hidden && replay.world.looks.steps === 0"

@@ -10,7 +10,9 @@ from PIL import Image
 from mbf_abstract.events import Event, EventKind
 from terrain.viewer.replay.replay_page import joint_replay_html, replay_html
 
-READY = "window.replay !== undefined && window.replay.used !== undefined && !window.replay.dirty"
+READY = (
+    "window.replay !== undefined && window.replay.used !== undefined && !window.replay.dirty && !window.replay.coarse"
+)
 DRAWN = "document.querySelector('canvas') !== null && document.querySelector('canvas').clientWidth > 300"
 
 
@@ -203,10 +205,10 @@ def test_no_chip_covers_the_robot_at_its_start(chromium, office_recording, tmp_p
 
     async def watch(page):
         await page.open((tmp_path / "replay.html").as_uri())
-        await page.wait_for(READY)
+        await page.wait_for("window.replay !== undefined && window.replay.used !== undefined")
         await page.key(" ")  # stands
         await page.key("Home")
-        await page.wait_for("window.replay.player.time < 0.2 && !window.replay.dirty")
+        await page.wait_for("window.replay.player.time < 0.2 && !window.replay.dirty && !window.replay.coarse")
         return await page.evaluate(robot), await page.evaluate(chips), await page.evaluate(canvas)
 
     places, boxes, (left, top) = chromium.visit(watch)
