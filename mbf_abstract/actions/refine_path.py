@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from mbf_abstract.actions.action import GoalJob
 from mbf_abstract.actions.plugin_action import PluginAction
+from mbf_abstract.execution.plan_check import leaves_map
 from mbf_abstract.execution.refiner import RefinerExecution
 from mbf_abstract.geometry import Path
 from mbf_abstract.goals.feedback_types import NoFeedback
@@ -49,8 +51,9 @@ class RefinePathAction(PluginAction[RefinePathGoal, RefinePathResult, NoFeedback
         run = self._supervise(job, plugin)
         with run, run.map_in_use():
             result = RefinerExecution(run, handle.goal.path).execute()
-        # 3. Measure what changed.
-        return self._measured(result, handle.goal.path, plugin.name)
+            # 3. Refuse a path that leaves the map, else measure what changed.
+            judge = partial(self._measured, result, handle.goal.path, plugin.name)
+            return run.call_beside("the map's path_problem()", judge)
 
     def _measured(self, result: RefineResult, original: Path, refiner: str) -> RefinePathResult:
         if not result.success:
@@ -59,6 +62,11 @@ class RefinePathAction(PluginAction[RefinePathGoal, RefinePathResult, NoFeedback
         if refined is None or len(refined) == 0:
             text = f"refiner {refiner!r} reported success but gave no poses"
             return RefinePathResult(RefinePathOutcome.INTERNAL_ERROR, text, refined_path=original, refiner=refiner)
+        if refined is not original and (problem := leaves_map(refined, self.runtime)):
+            outcome, text = RefinePathOutcome.INTERNAL_ERROR, f"the path of refiner {refiner!r} is refused: {problem}"
+            if before := leaves_map(original, self.runtime):
+                outcome, text = RefinePathOutcome.MAP_ERROR, f"before it was refined, {before}"
+            return RefinePathResult(outcome, text, refined_path=original, refiner=refiner)
         return RefinePathResult(
             int(result.outcome),
             result.message,

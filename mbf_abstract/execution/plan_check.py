@@ -69,13 +69,13 @@ def check_path(answer: PlanResult, request: PlanRequest, runtime: Runtime, area:
         if distance > tolerance + slack:
             text = f"pose {index} of the path is {distance:.2f} m from the {name}, allowed {tolerance + slack:.2f} m"
             return PlanResult(GetPathOutcome.INTERNAL_ERROR, text)
-    if problem := _off_the_map(path, runtime):
+    if problem := leaves_map(path, runtime):
         return PlanResult(GetPathOutcome.INTERNAL_ERROR, problem)
     return PlanResult(answer.outcome, answer.message, path, answer.cost)
 
 
-def _off_the_map(path: Path, runtime: Runtime) -> str:
-    """Where a path leads off the map; also that the map could not say so."""
+def leaves_map(path: Path, runtime: Runtime) -> str:
+    """Where a path in any frame leads off the map, empty if it does not; also that the map could not say so."""
     try:
         problem: object = runtime.map_hooks.path_problem(path)
     except Exception as error:

@@ -15,6 +15,22 @@ def polyline_lengths(points: FloatArray) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(norm(steps))])[: len(points)]
 
 
+def places_between(
+    points: FloatArray, spacing: float, longer_than: float = 0.0
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Places (k, d) between the points (n, d) of a polyline, at most ``spacing`` [m] apart, and the point before each.
+
+    Segments that are not longer than ``longer_than`` [m] have none, nor have those not longer than ``spacing``.
+    """
+    lengths = np.diff(polyline_lengths(points))
+    counts = np.ceil(lengths / spacing - 1e-9).astype(np.int64).clip(1)
+    counts[lengths <= longer_than] = 1
+    segments = np.repeat(np.arange(len(counts)), counts - 1)
+    firsts = np.cumsum(counts - 1) - (counts - 1)
+    shares = (np.arange(len(segments)) - firsts[segments] + 1.0) / counts[segments]
+    return points[segments] + shares[:, None] * (points[segments + 1] - points[segments]), segments
+
+
 def reverse_segments(path: Path, points: FloatArray) -> NDArray[np.bool_]:
     """(n - 1,) bool: which segments lead against the heading of their poses.
 

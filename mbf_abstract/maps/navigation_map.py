@@ -113,12 +113,13 @@ class NavigationMap(ABC):
         check, there = self.point_check(), (Pose(tuple(xyz), frame_id=self.frame_id) for xyz in positions.tolist())
         return next((index for index, pose in enumerate(there) if check(pose).state is CellState.OUTSIDE), -1)
 
+    def first_line_outside(self, positions: FloatArray) -> int:
+        """Index of the first position whose line to the next leads off the map; none (-1) does on a rectangle."""
+        return -1
+
     @abstractmethod
     def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
-        """Return a function that gives state and summed cost of the robot's outline, on the present map.
-
-        With ``center_only`` only the point below the robot's origin is looked at.
-        """
+        """A function: state and summed cost of the robot's outline, or of its centre alone, on the present map."""
 
     def path_check(self, query: PlaceQuery) -> PlaceCheck:
         """As ``pose_check``, of a robot on its path: LETHAL where ``obstacle_on_path`` would not let it come.

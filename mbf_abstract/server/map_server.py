@@ -27,6 +27,7 @@ from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult, PluginKind
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.server.path_on_map import path_problem
 from mbf_abstract.server.plugin_host import ServerError
 
 
@@ -120,13 +121,11 @@ class MapServer(AbstractNavigationServer):
         return reason
 
     def path_problem(self, path: Path) -> str:
-        """Which pose of a path is not on the map that plans are made on; empty if all are, or that is not known."""
+        """Where a path leaves the map that plans are made on; empty if it does not, or that is not known."""
         navigation_map = next(iter(self.served.values())).map
         with suppress(TransformError):
             there = self.runtime.transforms.transform_path(path, navigation_map.frame_id)
-            if (index := navigation_map.first_outside(there.positions)) >= 0:
-                x, y, z = path.positions[index].tolist()
-                return f"pose {index} of the path ({x:.2f}, {y:.2f}, {z:.2f}) is outside the map"
+            return path_problem(navigation_map, path, there.positions)
         return ""
 
     @property

@@ -4,8 +4,8 @@ When to use: behind a grid planner (A*, Theta*), before a controller that follow
 ``costmap.hybrid_astar``, which are drivable already - smoothing ignores headings and would break their curvature.
 
 The result is no worse than the path given: where costs are above ``highest_cost`` it comes no more than a cell nearer
-to obstacles, and the outline is nowhere on worse cells than it was somewhere on the path; where it would be, points
-stay.
+to obstacles, and on no line between its poses does the outline touch worse cells than it did near there on the path
+given, robots looking along both; where it would, points stay.
 
 The end poses stay, and so do the heights along the path. A path in another frame than the costmap's is smoothed there
 and handed back in its own. A path that drives backward somewhere is handed back unchanged. With ``max_curvature`` the
@@ -18,13 +18,12 @@ Formula: the gradient smoother of Dolgov et al. 2010 without its Voronoi term, w
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.arithmetic import arctan2
 from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_abstract.maps.refiners.map_refiner import MapRefiner
@@ -33,9 +32,9 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RefineResult
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.control.path_geometry import resample
-from mbf_costmap_nav.grid.collision import footprint_costs
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.kernels.control.smoothing import HIGHEST, costs_near, relax_path
+from mbf_costmap_nav.kernels.map.swept_outline import swept_states
 from mbf_costmap_nav.plugins import CostmapRefiner
 
 FloatArray = NDArray[np.float64]
@@ -43,6 +42,8 @@ FloatArray = NDArray[np.float64]
 SOFTER = 0.25
 """Each further attempt for the curvature multiplies the weight of the original path by this."""
 ATTEMPTS = 6
+OUTLINE_ATTEMPTS = 12
+"""How often more points stay, until the outline is nowhere on worse cells; each time those of a longer stretch."""
 LETHAL_STEP = 0.1
 """Distance [cells] of the places at which the result is looked up."""
 LINES = 2
@@ -77,29 +78,31 @@ class SmootherRefiner(CostmapRefiner, MapRefiner):
         points = resample(path.positions[:, :2], self.parameters.spacing)
         lengths, old_lengths = polyline_lengths(points), polyline_lengths(path.positions[:, :2])
         heights = np.interp(lengths, old_lengths, path.positions[:, 2])
-        given = _along(path, points, heights)
-        allowed = self._states(costmap, [*path, *given]).max(axis=0)
+        near = max(self.costmap.footprint.circumscribed_radius, self.parameters.spacing)
+        allowed = highest_near(self._states(costmap, points), lengths, near)
         fixed = np.zeros(len(points), dtype=np.bool_)
-        for attempt in range(1, ATTEMPTS + 1):
+        for attempt in range(1, OUTLINE_ATTEMPTS + 1):
             smoothed = self._drivable(costmap, points, fixed, cancel_token)
             if isinstance(smoothed, RefineResult):
                 return smoothed
-            refined = _along(path, smoothed, heights)
-            worse = np.flatnonzero((self._states(costmap, refined) > allowed).any(axis=1))
+            worse = np.flatnonzero((self._states(costmap, smoothed) > allowed).any(axis=1))
             if not len(worse) or cancel_token.cancelled:
-                return refined
-            near = attempt * max(self.costmap.footprint.circumscribed_radius, self.parameters.spacing)
-            fixed |= (np.abs(lengths[:, None] - lengths[worse]) <= near).any(axis=1)
-        x, y, _ = refined.positions[worse[0]].tolist()
+                return _along(path, smoothed, heights)
+            x, y = smoothed[worse[0]].tolist()
+            ends = np.concatenate([lengths[worse], lengths[worse + 1]])
+            fixed |= (np.abs(lengths[:, None] - ends) <= attempt * near).any(axis=1)
         text = f"smoothed, the path would be worse for the robot's outline at ({x:.2f}, {y:.2f}), and is left as it is"
         return RefineResult(RefinePathOutcome.SUCCESS, text, path)
 
-    def _states(self, costmap: Costmap, poses: Iterable[Pose]) -> NDArray[np.int64]:
-        """(n, 2) worst ``CellState`` under the padded outline, which controllers check, and under the plain one."""
-        outlines = self.costmap.footprint, self.costmap.unpadded_footprint
-        places = [(pose.x, pose.y, pose.yaw) for pose in poses]
-        states = [[footprint_costs(costmap, outline, *place).state for outline in outlines] for place in places]
-        return np.array(states, dtype=np.int64)
+    def _states(self, costmap: Costmap, points: FloatArray) -> NDArray[np.int64]:
+        """Worst states (n - 1, 4) on the lines between points: of all cells touched, and of the known ones among them.
+
+        First of the padded outline, which controllers check, then of the plain one.
+        """
+        in_cells = (points - (costmap.origin_x, costmap.origin_y)) / costmap.resolution
+        outlines = (self.costmap.footprint.vertices, self.costmap.unpadded_footprint.vertices)
+        corners = [outline if len(outline) > 2 else np.zeros((1, 2)) for outline in outlines]
+        return np.hstack([swept_states(costmap.cells, one / costmap.resolution, in_cells) for one in corners])
 
     def _drivable(
         self, costmap: Costmap, points: FloatArray, fixed: NDArray[np.bool_], token: CancelToken
@@ -156,6 +159,16 @@ def _along(path: Path, points: FloatArray, heights: FloatArray) -> Path:
     positions, orientations = np.column_stack([points, heights]), flat.orientations.copy()
     positions[[0, -1]], orientations[[0, -1]] = path.positions[[0, -1]], path.orientations[[0, -1]]
     return Path(positions, orientations, path.frame_id, path.stamp)
+
+
+def highest_near(states: NDArray[np.int64], lengths: FloatArray, near: float) -> NDArray[np.int64]:
+    """(n - 1, k) highest states of all lines within ``near`` [m] along the path from each of its lines.
+
+    ``lengths`` (n,) [m] are those up to its points.
+    """
+    first = np.searchsorted(lengths[1:], lengths[:-1] - near)
+    last = np.searchsorted(lengths[:-1], lengths[1:] + near, side="right")
+    return np.array([states[i:j].max(axis=0) for i, j in zip(first, last, strict=True)])
 
 
 def first_lethal(costmap: Costmap, points: FloatArray) -> FloatArray | None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry.polyline import places_between
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
 from mbf_mesh_nav.arrays import FloatArray
@@ -27,6 +28,12 @@ from mbf_mesh_nav.mesh.turning import pivots, slope_at, swept_obstacle
 
 if TYPE_CHECKING:
     import networkx
+
+
+PLACES_AN_EDGE = 2.0
+"""Places per mean edge of the mesh at which lines between poses are looked up."""
+LONG_LINE = 1.5
+"""Mean edges; shorter lines between poses are not looked at."""
 
 
 class SnapshotAnswers(OutlinedMap):
@@ -108,6 +115,16 @@ class SnapshotAnswers(OutlinedMap):
         outside = beyond_border(self.topology, positions, location)
         outside[1:-1] |= location.distances[1:-1] > OF_PLACES
         return int(np.argmax(outside)) if outside.any() else -1
+
+    def first_line_outside(self, positions: FloatArray) -> int:
+        """The first line past a border; how far above or below the surface it leads does not matter.
+
+        Lines of up to one and a half edges of the mesh are not looked at: planners' paths have few others.
+        """
+        edge = self.topology.mean_edge_length
+        places, lines = places_between(positions, edge / PLACES_AN_EDGE, LONG_LINE * edge)
+        outside = beyond_border(self.topology, places, self.locate(places))
+        return int(lines[np.argmax(outside)]) if outside.any() else -1
 
     def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
         """State and summed cost below the robot's disc."""

@@ -6,8 +6,9 @@ follow edges. When not: behind ``mesh.any_angle`` and ``mesh.cvp``, whose paths 
 
 Start and goal stay. Each piece of the path is replaced by the geodesic near it, or by the shortest path through its
 own faces, or its two halves are, whichever has the least cost: length plus the map's costs integrated along it. So the
-result never costs more than the path given. No new face has a blocked corner; where the path leads along edges between
-blocked faces it stays. A path that drives backward somewhere is handed back unchanged.
+result never costs more than the path given. No new face has a blocked corner, nor does the robot touch anything where
+it touched nothing near there on the path given; where the path leads along edges between blocked faces it stays. A path
+that drives backward somewhere is handed back unchanged; one that leaves the map between its poses is a MAP_ERROR.
 
 Formula: the funnel algorithm (Lee and Preparata 1984) in a corridor of faces that is turned round the vertices where
 that makes it shorter (Xin and Wang 2007), see ``kernels.wave.corridors``.
@@ -32,9 +33,14 @@ from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.plugins import MeshRefiner
 from mbf_mesh_nav.search.corridor import Corridor, Piece
 from mbf_mesh_nav.search.surface_planner import SAME_POINT
+from mbf_mesh_nav.search.touched_places import TouchedPlaces
 
 FLAT = 1e-6
 """m; lines between poses that are no farther from the surface lie on it."""
+GAP = 0.01
+"""m; a line farther from the surface does not lie on it, whatever the rounding."""
+ATTEMPTS = 6
+"""How often the path is pulled, each time past more faces in which the robot would touch something."""
 POINTS_AN_EDGE = 2.0
 """Points put onto the surface per mean edge of the mesh where the poses of a path are farther apart."""
 
@@ -61,11 +67,20 @@ class StringPullingRefiner(MeshRefiner, MapRefiner):
     def refine(self, path: Path, cancel_token: CancelToken) -> Path | RefineResult:
         """Pull the path straight between its ends."""
         snapshot = self.mesh_map.snapshot()
-        corridor = Corridor(self.mesh_map, snapshot, snapshot.blocked(self.parameters.cost_limit))
-        piece = self._on_surface(corridor, path.positions)
+        blocked = snapshot.blocked(self.parameters.cost_limit)
+        piece = self._on_surface(Corridor(self.mesh_map, snapshot, blocked), path.positions)
         if isinstance(piece, RefineResult):
             return piece
-        return self._with_poses(path, self._pulled(corridor, piece, cancel_token))
+        touched = TouchedPlaces(self.mesh_map, snapshot)
+        for _ in range(ATTEMPTS):
+            pulled = self._pulled(Corridor(self.mesh_map, snapshot, blocked), piece, cancel_token)
+            new_faces = touched.new_faces(pulled, piece)
+            if not len(new_faces) or cancel_token.cancelled:
+                return self._with_poses(path, pulled)
+            blocked[self.mesh_map.faces[new_faces]] = True
+        place = position_text(self.mesh_map.vertices[self.mesh_map.faces[new_faces[0], 0]])
+        text = f"shortened, the path would make the robot touch something near {place}, and is left as it is"
+        return RefineResult(RefinePathOutcome.SUCCESS, text, path)
 
     def _on_surface(self, corridor: Corridor, positions: FloatArray) -> Piece | RefineResult:
         """The path as points and the faces its segments lie in, or what is off the surface."""
@@ -83,7 +98,12 @@ class StringPullingRefiner(MeshRefiner, MapRefiner):
             faces = np.concatenate([spots.faces[:1], spots.faces[:1], middles.faces, spots.faces[-1:]])
             return spots.points[ends], faces
         # Poses too far apart for the surface between them: the string through the faces below the lines between them.
-        return corridor.string(spots.points[ends], spots.faces[ends])
+        piece = corridor.string(spots.points[ends], spots.faces[ends])
+        gaps = self.mesh_map.locate(0.5 * (piece[0][1:] + piece[0][:-1])).distances > GAP
+        if gaps.any():
+            text = f"the path leaves the surface after {position_text(piece[0][np.argmax(gaps)])}"
+            return RefineResult(RefinePathOutcome.MAP_ERROR, text)
+        return piece
 
     def _pulled(self, corridor: Corridor, piece: Piece, cancel_token: CancelToken) -> Piece:
         """Passes until one gains too little; each cuts the path elsewhere, so that no cut leaves a corner."""

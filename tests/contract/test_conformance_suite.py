@@ -114,7 +114,7 @@ FAULTS = {
         "a_bad_change_changes_nothing",
         "a_bad_change_is_named",
     },
-    believes_its_planners: {"a_planned_path_off_the_map_is_refused"},
+    believes_its_planners: {"a_planned_path_off_the_map_is_refused", "a_refined_path_off_the_map_is_refused"},
     ignores_silence: {
         "a_silent_sensor_holds_the_robot_while_it_drives",
         "a_sensor_that_stays_silent_ends_the_path_with_map_error",

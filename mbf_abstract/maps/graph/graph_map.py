@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.geometry.polyline import places_between
 from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_abstract.maps.disc_map import DiscMap
 from mbf_abstract.maps.graph.graph_layers import InflationLayer, InflationParameters, ObstacleLayer, ObstacleParameters
@@ -105,6 +106,12 @@ class GraphMap(LayeredMap, DiscMap):
     @abstractmethod
     def nodes_at(self, points: FloatArray) -> IntArray:
         """Node (k,) next to each of the points (k, 2 or 3) [m]; -1 where there is no ground."""
+
+    def first_line_outside(self, positions: FloatArray) -> int:
+        """The first line over a place without ground; gaps narrower than the robot's radius may be overlooked."""
+        places, lines = places_between(positions, self.robot_radius)
+        outside = self.nodes_at(places) < 0
+        return int(lines[np.argmax(outside)]) if outside.any() else -1
 
     # ------------------------------------------------------------------------------------------------- sensors
     def take_in(self, scan: RangeScan) -> None:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
-from mbf_abstract.geometry import Twist
-from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
-from mbf_abstract.plugins import ControlRequest, ControlResult, PlanRequest, PlanResult, PluginKind
+from mbf_abstract.geometry import Path, Twist
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RefinePathOutcome
+from mbf_abstract.plugins import ControlRequest, ControlResult, PlanRequest, PlanResult, PluginKind, RefineResult
 from mbf_abstract.testing.conformance.rig import START
 from mbf_abstract.testing.conformance.site import Site, situation, somewhere
+from mbf_abstract.time.cancel import CancelToken
 
 
 @contextmanager
-def _answering(site: Site, kind: PluginKind, method: str, answer: Callable[[Any], object]) -> Iterator[str]:
+def _answering(site: Site, kind: PluginKind, method: str, answer: Callable[..., object]) -> Iterator[str]:
     """Let the first plugin of a kind answer by a function for the time of a ``with`` block; its name."""
     plugin = site.server.plugins.all_of(kind)[0]
     setattr(plugin.instance, method, answer)
@@ -37,6 +37,24 @@ def a_planned_path_off_the_map_is_refused(site: Site) -> None:
         site.expect_outcome(plan, GetPathOutcome.INTERNAL_ERROR, "of the path (2.", "is outside the map")
         site.expect(plan.path is None, "the path off the map was handed out")
     site.expect_outcome(site.navigator.get_path(goal), GetPathOutcome.SUCCESS)
+
+
+@situation()
+def a_refined_path_off_the_map_is_refused(site: Site) -> None:
+    """A refiner's path that leaves the map ends with INTERNAL_ERROR, the pose and the given path."""
+    if not site.server.plugins.all_of(PluginKind.REFINER):
+        return
+    path = site.path((START.x, START.y), (5.0, 4.0))
+
+    def leaving(given: Path, token: CancelToken) -> RefineResult:
+        return RefineResult(RefinePathOutcome.SUCCESS, "", site.path((START.x, START.y), (3.0, -3.0), (5.0, 4.0)))
+
+    with _answering(site, PluginKind.REFINER, "apply_refinement", leaving) as name:
+        result = site.navigator.refine_path(path, refiner=name)
+    texts = f"the path of refiner {name!r} is refused", "of the path (2.", "is outside the map"
+    site.expect_outcome(result, RefinePathOutcome.INTERNAL_ERROR, *texts)
+    site.expect(result.refined_path is path, "the path as it was given does not come back")
+    site.expect_outcome(site.navigator.refine_path(path, refiner=name), RefinePathOutcome.SUCCESS)
 
 
 @situation(controller_max_retries=-1)

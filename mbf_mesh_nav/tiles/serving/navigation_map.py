@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.polyline import places_between
 from mbf_abstract.maps.view import GridView
 from mbf_mesh_nav.arrays import FlagArray, FloatArray
 from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray
@@ -32,6 +33,8 @@ from mbf_mesh_nav.tiles.serving.windows.window_settings import WindowSettings
 from mbf_mesh_nav.tiles.tile import TileKey
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
+PLACES_A_TILE = 8.0
+"""Places per length of a tile at which lines between poses are looked up."""
 NO_WINDOW = "the map of tiles has no window around the robot"
 NO_VIEW = GridView(np.zeros((0, 0), dtype=np.float32), (0.0,) * 4)
 CANCEL_PERIOD = 0.05
@@ -147,6 +150,12 @@ class TiledNavigationMap(TileQuestions):
             low, high = np.array(box[:2]) - BORDER_SLACK, np.array(box[3:5]) + BORDER_SLACK
             outside &= ((plan < low) | (plan > high)).any(axis=1)
         return int(np.argmax(outside)) if outside.any() else -1
+
+    def first_line_outside(self, positions: FloatArray) -> int:
+        """The first line over a place without a tile."""
+        places, lines = places_between(positions, self.tiled.index.tile_size / PLACES_A_TILE)
+        index = self.first_outside(places) if len(places) else -1
+        return int(lines[index]) if index >= 0 else -1
 
     def moment(self) -> Moment:
         """The map as it is now."""
