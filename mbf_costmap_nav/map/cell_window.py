@@ -21,11 +21,13 @@ class CellWindow:
         The grid; after it is replaced, ``forbid_all`` makes its cells.
     pending : CellBox
         Cells that the next update computes anew, whatever the layers report.
+    renewals : int
+        How often ``recompute_all`` was called.
     """
 
     def __init__(self, geometry: GridGeometry, default_cost: int, frame_id: str) -> None:
         self.geometry = geometry
-        self.pending = geometry.box
+        self.pending, self.renewals = geometry.box, 0
         self._default_cost, self._frame_id = default_cost, frame_id
         self._cells = self.default_cells()
         self._version = 0
@@ -35,9 +37,14 @@ class CellWindow:
         """Cells (height, width) that no layer has written."""
         return self._filled(self._default_cost)
 
-    def recompute_all(self) -> None:
-        """Let the next update compute all cells."""
+    def compute_all(self) -> None:
+        """Let the next update compute all cells, though no layer is another one."""
         self.pending = self.geometry.box
+
+    def recompute_all(self) -> None:
+        """Let the next update compute all cells, as a layer, the grid or the robot's outline is another one."""
+        self.renewals += 1
+        self.compute_all()
 
     def forbid_all(self) -> None:
         """Forbid all cells until the update is done: if a layer raises now, nobody plans over the last floor."""

@@ -24,6 +24,7 @@ from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.map.cell_window import CellWindow
 from mbf_costmap_nav.map.layer import CostmapLayer
 from mbf_costmap_nav.map.layer_answers import LayerAnswers, legal_box
+from mbf_costmap_nav.map.permanent_layers import PermanentLayers
 
 
 class LayeredCostmap(LayerAnswers):
@@ -82,6 +83,7 @@ class LayeredCostmap(LayerAnswers):
         self._footprint_padding = footprint_padding
         self.last_update: float | None = None
         self._after_layers: dict[str, CellArray] | None = None  # cells as each layer has left them; None = not kept
+        self._permanent = PermanentLayers()
         self._avoided: tuple[AvoidedPlace, ...] = ()
         self._unmoved: set[str] = set()  # names of layers whose cells are not those of the window, or of their floor
         for layer in layers:
@@ -99,19 +101,12 @@ class LayeredCostmap(LayerAnswers):
         """Costs that the permanent layers alone give, as if no sensor saw anything.
 
         None on a rolling window, before the first update, without permanent layers, and where another layer may lower
-        their costs.
+        their costs. The same object until something other than a sensor changes the map.
         """
         with self._lock:
-            layers = list(self.layers.enabled)
-            safe = all(layer.permanent or layer.only_raises for layer in layers)
-            if self.rolling_window or self.last_update is None or not safe:
+            if self.rolling_window or self.last_update is None:
                 return None
-            permanent = [layer for layer in layers if layer.permanent]
-            self._window.recompute_all()  # layers may keep notes of the cells they are asked for
-            cells = self._window.default_cells()
-            for layer in permanent:
-                layer.update_costs(cells, self.geometry.box)
-            return self._window.costmap(cells, self.last_update) if permanent else None
+            return self._permanent.costmap(list(self.layers.enabled), self._window, self.last_update)
 
     def costs_after_layers(self, x: float, y: float) -> dict[str, int]:
         """Cost of the cell at (x, y) [m] as each enabled layer has left it, in their order; empty off the map.
@@ -121,7 +116,7 @@ class LayeredCostmap(LayerAnswers):
         with self._lock:
             if self._after_layers is None:
                 self._after_layers = {}
-                self._window.recompute_all()
+                self._window.compute_all()
             column, row = self.geometry.world_to_cell_unbounded(x, y)
             if not (0 <= column < self.geometry.width and 0 <= row < self.geometry.height):
                 return {}
@@ -176,10 +171,13 @@ class LayeredCostmap(LayerAnswers):
             if self.rolling_window and robot_pose is not None:
                 self._follow(robot_pose)
             box = self._window.pending
-            self._window.recompute_all()  # stays so if a layer raises: the next update then repairs everything
+            self._window.compute_all()  # stays so if a layer raises: the next update then repairs everything
             for layer in self.layers.enabled:
+                before = box
                 with self.layers.computing(layer):
                     box = legal_box(layer.update_bounds(robot_pose, now, box))
+                if layer.permanent and before.empty and not box.empty:
+                    self._permanent.forget()
             box = box.clipped(self.geometry.box)
             if not box.empty:
                 self._recompute(box)
@@ -215,7 +213,7 @@ class LayeredCostmap(LayerAnswers):
         """Forbid the robot's centre in these discs, and in no others, from the next update on."""
         with self._lock:
             self._avoided = tuple(places)
-            self._window.recompute_all()
+            self._window.compute_all()
 
     def _follow(self, robot_pose: Pose) -> None:
         """Move the window so that the robot is in its middle, and the layers with it."""

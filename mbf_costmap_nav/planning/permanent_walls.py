@@ -6,13 +6,19 @@ sensor writes: where even that has no path, waiting and trying again are useless
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
+from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
-from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
+from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN, Costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 
 EIGHT_NEIGHBOURS = np.ones((3, 3), dtype=bool)
+
+_pieces_of: WeakKeyDictionary[Costmap, dict[int, NDArray[np.unsignedinteger]]] = WeakKeyDictionary()
+"""Connected pieces of free space by the least cost that is not free; the costmap is the same until walls change."""
 
 
 def is_permanently_unreachable(
@@ -26,13 +32,11 @@ def is_permanently_unreachable(
     walls = costmap.permanent_costmap()
     if walls is None or not (walls.contains(start.x, start.y) and walls.contains(goal.x, goal.y)):
         return False
-    free = (walls.cells < max(lethal_cost, INSCRIBED)) | (walls.cells == UNKNOWN)
+    threshold = max(lethal_cost, INSCRIBED)
     ix, iy = walls.world_to_cell_clamped(start.x, start.y)
-    if not free[iy, ix]:
+    if threshold <= walls.cells[iy, ix] != UNKNOWN:
         return False
-    from scipy import ndimage  # takes 0.13 s to import, and most plans are found
-
-    pieces, _ = ndimage.label(free, EIGHT_NEIGHBOURS)
+    pieces = _pieces(walls, threshold)
     goal_x, goal_y = walls.world_to_cell_clamped(goal.x, goal.y)
     reach = tolerance / walls.resolution + 1.0 if tolerance > 0.0 else 0.0
     near = int(min(reach, max(pieces.shape)))  # the tolerance may be inf
@@ -40,3 +44,15 @@ def is_permanently_unreachable(
     around = pieces[below : goal_y + near + 1, left : goal_x + near + 1]
     rows, columns = np.nonzero(around == pieces[iy, ix])
     return bool(((columns + left - goal_x) ** 2 + (rows + below - goal_y) ** 2 > reach * reach).all())
+
+
+def _pieces(walls: Costmap, threshold: int) -> NDArray[np.unsignedinteger]:
+    """Number (height, width) of the connected piece of free or unknown space that a cell belongs to, 0 in walls."""
+    found = _pieces_of.setdefault(walls, {})
+    if threshold not in found:
+        from scipy import ndimage  # takes 0.13 s to import, and most plans are found
+
+        free = (walls.cells < threshold) | (walls.cells == UNKNOWN)
+        pieces, count = ndimage.label(free, EIGHT_NEIGHBOURS)
+        found[threshold] = pieces.astype(np.min_scalar_type(count))  # mostly a byte a cell, as the map itself
+    return found[threshold]

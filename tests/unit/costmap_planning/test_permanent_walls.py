@@ -8,6 +8,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_costmap_nav.grid.costmap import INSCRIBED, Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
@@ -115,3 +116,56 @@ def test_walls_separate_what_they_separate_when_every_cell_is_looked_at(rooms):
             answers.append(is_permanently_unreachable(costmap, start, goal, tolerance))
             assert answers[-1] == separated_by_hand(costmap, start, goal, tolerance)
     assert 0.1 < np.mean(answers) < 0.9
+
+
+def test_permanent_walls_are_computed_once_however_often_sensors_change_the_map(make_plugin, rooms):
+    costmap = rooms(gap=0, sensed=True)
+    walls = costmap.permanent_costmap()
+    for number in range(3):
+        assert plan(make_plugin, AStarPlanner, costmap).permanent
+        costmap.insert_points("scan", [(3.05, 3.05 + 0.1 * number, 0.2)], (1.0, 2.5, 0.2), 1.0 + number)
+        box = costmap.update(Pose.planar(1.0, 2.5), 1.0 + number)
+        assert number == 0 or box != costmap.geometry.box  # the first one follows what was computed before
+    assert costmap.permanent_costmap() is walls
+
+
+def disabled(costmap, name):
+    costmap.set_layer_parameters(name, costmap.layers[name].parameters.model_copy(update={"enabled": False}))
+
+
+def wider(costmap):
+    usual = costmap.layers["inflation"].parameters
+    costmap.set_layer_parameters("inflation", usual.model_copy(update={"inflation_radius": 0.9}), until=5.0)
+
+
+CHANGES = [
+    lambda costmap: disabled(costmap, "inflation"),
+    lambda costmap: disabled(costmap, "static"),
+    wider,
+    lambda costmap: costmap.set_footprint(Footprint.circle(0.4)),
+    lambda costmap: costmap.clear_area(Pose.planar(5.05, 2.5), 2.0, ["static"]),
+]
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=["inflation off", "static off", "override", "outline", "cleared"])
+def test_permanent_walls_follow_every_change_that_no_sensor_makes(rooms, change):
+    costmap, fresh = rooms(gap=0, sensed=True), rooms(gap=0, sensed=True)
+    before = costmap.permanent_costmap()
+    for one in (costmap, fresh):
+        change(one)
+        one.update(Pose.planar(1.0, 2.5), 1.0)
+    after, expected = costmap.permanent_costmap(), fresh.permanent_costmap()
+    assert np.array_equal(after.cells, expected.cells) and not np.array_equal(after.cells, before.cells)
+    if change is wider:  # until its time is over
+        costmap.update(Pose.planar(1.0, 2.5), 6.0)
+        assert np.array_equal(costmap.permanent_costmap().cells, before.cells)
+
+
+def test_a_permanent_layer_that_reports_a_change_by_itself_is_looked_at_again(rooms):
+    costmap = rooms(gap=0, sensed=False)
+    before = costmap.permanent_costmap()
+    costmap.update(Pose.planar(1.0, 2.5), 1.0)
+    costmap.layers["static"].cells[:, 50] = 0
+    costmap.layers["static"]._changed = costmap.geometry.box
+    costmap.update(Pose.planar(1.0, 2.5), 2.0)
+    assert before.cells.max() == 254 and costmap.permanent_costmap().cells.max() == 0
