@@ -21,7 +21,7 @@ from terrain.physics.motion_sample import Thing
 from terrain.physics.protocols import SimulatedRobot
 from terrain.physics.robot_models import RobotSpec
 from terrain.physics.world import BulletWorld
-from terrain.recording.robot_shape import RobotShape
+from terrain.recording.recorded_robot import RobotShape
 from terrain.worlds.surface import Surface, box, cylinder, joined
 from terrain.worlds.upright_solids import UprightSolid
 

@@ -10,8 +10,8 @@ from mbf_abstract.drive_log import DriveLog, LoggedScan
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.maps.view import GridView, MapView, MeshView
 from terrain.recording.recorded_maps import RecordedGrid, RecordedMesh, add_if_changed
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recording import Recording, RecordingError
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.run_folder import read_run, robots_of
 from terrain.recording.verdict import Verdict
 

@@ -50,23 +50,24 @@ class RecordedGrid:
         return np.where(self.cells == UNKNOWN, np.float32(np.nan), levels)
 
 
-def grid_arrays(grids: list[RecordedGrid]) -> dict[str, Any]:
+def grid_arrays(grids: list[RecordedGrid], name: str = "grid") -> dict[str, Any]:
     """All grids as four arrays for a file: flat cells, shapes (n, 2), extents (n, 4), times (n,)."""
     return {
-        "grid_cells": np.concatenate([np.zeros(0, np.uint8), *(grid.cells.ravel() for grid in grids)]),
-        "grid_shapes": np.array([grid.cells.shape for grid in grids], np.int64).reshape(-1, 2),
-        "grid_extents": np.array([grid.extent for grid in grids], np.float64).reshape(-1, 4),
-        "grid_times": np.array([grid.time for grid in grids], np.float64),
+        f"{name}_cells": np.concatenate([np.zeros(0, np.uint8), *(grid.cells.ravel() for grid in grids)]),
+        f"{name}_shapes": np.array([grid.cells.shape for grid in grids], np.int64).reshape(-1, 2),
+        f"{name}_extents": np.array([grid.extent for grid in grids], np.float64).reshape(-1, 4),
+        f"{name}_times": np.array([grid.time for grid in grids], np.float64),
     }
 
 
-def grids_from(arrays: dict[str, Any]) -> list[RecordedGrid]:
+def grids_from(arrays: dict[str, Any], name: str = "grid") -> list[RecordedGrid]:
     """Read what ``grid_arrays`` made; older recordings may have none."""
-    if "grid_cells" not in arrays:
+    if f"{name}_cells" not in arrays:
         return []
-    shapes, ends = arrays["grid_shapes"], np.cumsum(arrays["grid_shapes"].prod(axis=1))
-    parts = np.split(arrays["grid_cells"], ends[:-1]) if len(ends) else []
-    facts = zip(arrays["grid_times"].tolist(), parts, shapes, arrays["grid_extents"].tolist(), strict=True)
+    cells, shapes, extents, times = (arrays[f"{name}_{part}"] for part in ("cells", "shapes", "extents", "times"))
+    ends = np.cumsum(shapes.prod(axis=1))
+    parts = np.split(cells, ends[:-1]) if len(ends) else []
+    facts = zip(times.tolist(), parts, shapes, extents.tolist(), strict=True)
     return [RecordedGrid(time, part.reshape(shape), tuple(extent)) for time, part, shape, extent in facts]
 
 

@@ -16,19 +16,21 @@ from numpy.typing import ArrayLike
 
 from mbf_abstract.event_values import well_formed
 from mbf_abstract.events import Event
-from mbf_abstract.geometry import Command, FloatArray, Pose, Twist
+from mbf_abstract.geometry import Command, FloatArray, Pose, Quaternion, Twist
+from mbf_abstract.geometry.transform import IDENTITY_ROTATION
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.maps.view import GridView, MapView, MeshView
 from terrain.physics.protocols import Actor
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorded_maps import RecordedGrid, RecordedLayer, RecordedMesh, add_if_changed, half_precision
 from terrain.recording.recorded_objects import RecordedObjects
+from terrain.recording.recorded_robot import NO_REPORT, REPORTED, Report, ReportRecorder, RobotShape
 from terrain.recording.recording import Recording, StampedPoints
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import UNFINISHED, Verdict
 from terrain.worlds.surface import Surface
 
 MAP_PERIOD = 5.0  # s at least between two looks at the map
+LOCAL_MAP_PERIOD = 1.0  # s between two looks at the map around the robot, and at its outline
 OBJECTS_PERIOD = 0.2  # s at least between two looks at what moves
 MAX_GRID_CELLS = 4_000_000  # larger maps are not recorded
 MAX_MESH_VERTICES = 1_000_000  # nor are these
@@ -45,6 +47,8 @@ class Taken(NamedTuple):
     meshes: int = 0
     layers: int = 0
     objects: int = 0
+    outlines: int = 0
+    local_grids: int = 0
 
 
 @dataclass(eq=False)
@@ -61,6 +65,8 @@ class Recorder:
         What moves by itself; looked at with every sample.
     map_budget : int
         How many costs of maps may still be recorded.
+    reports : ReportRecorder
+        What is not a true value, but what the navigation had.
     """
 
     scenario: str
@@ -80,16 +86,17 @@ class Recorder:
     objects: list[RecordedObjects] = field(default_factory=list)
     actors: Sequence[Actor] = ()
     map_budget: int = MAX_MAP_COSTS
+    reports: ReportRecorder = field(default_factory=ReportRecorder)
     _actor_poses: list[list[list[float]]] = field(default_factory=list)
     _next_map: float = -math.inf
     _next_objects: float = -math.inf
     _samples: list[list[float]] = field(default_factory=list)
     _taken: Taken = field(default_factory=Taken)
 
-    def sample(self, time: float, pose: Pose, velocity: Twist, command: Command) -> None:
+    def sample(self, time: float, pose: Pose, velocity: Twist, command: Command, report: Report = NO_REPORT) -> None:
         """Add one sample; call at a steady rate (10 to 20 Hz). Commands of a car are its speed and zero turning."""
         asked = [command.vx, command.vy, command.wz] if isinstance(command, Twist) else [command.speed, 0.0, 0.0]
-        row = [time, *pose.position, *pose.orientation, velocity.vx, velocity.vy, velocity.wz, *asked]
+        row = [time, *pose.position, *pose.orientation, velocity.vx, velocity.vy, velocity.wz, *asked, *report.row()]
         self._samples.append(row)
         self._actor_poses.append([[*p.position, *p.orientation] for p in (actor.pose() for actor in self.actors)])
 
@@ -97,10 +104,26 @@ class Recorder:
         """Add a plan (m, 3) [m] that the robot follows from now on."""
         self.paths.append((time, np.array(points, dtype=np.float64).reshape(-1, 3)))
 
-    def scan(self, time: float, points: ArrayLike, origin: ArrayLike) -> None:
-        """Add the points (k, 3) [m] that a range sensor at ``origin`` (3,) [m] hit, in the map."""
+    def scan(
+        self,
+        time: float,
+        points: ArrayLike,
+        origin: ArrayLike,
+        sensor: str = "",
+        orientation: Quaternion = IDENTITY_ROTATION,
+    ) -> None:
+        """Add the points (k, 3) [m] that a range sensor at ``origin`` (3,) [m] hit, in the map.
+
+        Parameters
+        ----------
+        sensor : str
+            Its frame, one of the mounts of ``reports``; empty if that is not known.
+        orientation : (4,) float
+            Its orientation in the map.
+        """
         self.scans.append((time, np.array(points, dtype=np.float64).reshape(-1, 3)))
         self.scan_origins.append(np.array(origin, dtype=np.float64).reshape(3))
+        self.reports.scan(sensor, orientation)
 
     def map(self, time: float, look: Callable[..., MapView | None], layers: Sequence[str] = ()) -> None:
         """Add what the map looks like now, unless it is too large or was looked at some seconds ago.
@@ -165,13 +188,13 @@ class Recorder:
 
     def _all(self) -> Taken:
         kept: tuple[Sized, ...] = (self._samples, self.paths, self.scan_origins, self.grids, self.meshes, self.layers)
-        return Taken(*map(len, (*kept, self.objects)))
+        return Taken(*map(len, (*kept, self.objects, self.reports.outlines, self.reports.local_grids)))
 
     def _recording(
         self, before: Taken, now: Taken, verdict: Verdict, events: Sequence[Event], began: float
     ) -> Recording:
         """Return all from ``before`` to ``now``."""
-        rows = np.array(self._samples[before.samples : now.samples], dtype=np.float64).reshape(-1, 14)
+        rows = np.array(self._samples[before.samples : now.samples], dtype=np.float64).reshape(-1, 14 + REPORTED)
         meshes = self.meshes[before.meshes : now.meshes]
         if before.meshes:  # the surface has been taken
             meshes = [replace(mesh, vertices=np.zeros((0, 3)), faces=np.zeros((0, 3), np.int32)) for mesh in meshes]
@@ -201,6 +224,12 @@ class Recorder:
             layers=self.layers[before.layers : now.layers],
             actors=self._actor_tracks(before.samples, now.samples),
             objects=self.objects[before.objects : now.objects],
+            reports=self.reports.between(
+                rows[:, 14:].copy(),
+                slice(before.scans, now.scans),
+                slice(before.outlines, now.outlines),
+                slice(before.local_grids, now.local_grids),
+            ),
         )
 
     def actor_tracks(self) -> list[ActorTrack]:

@@ -33,7 +33,7 @@ from terrain.recording.recorded_maps import (
     meshes_from,
 )
 from terrain.recording.recorded_objects import RecordedObjects, object_arrays, objects_from
-from terrain.recording.robot_shape import RobotShape
+from terrain.recording.recorded_robot import RobotReports, RobotShape, reports_from
 from terrain.recording.verdict import Verdict
 from terrain.worlds.surface import Surface
 
@@ -65,6 +65,8 @@ class Recording:
         Points a range sensor hit, in the map.
     scan_origins : (len(scans), 3) float64
         Where its rays started [m], in the map; without rows in older recordings.
+    reports : RobotReports
+        What the robot reported of itself.
     ground, walls, obstacles : Surface or None
         Obstacles are things that are on no map.
     goals : tuple of Pose
@@ -105,6 +107,7 @@ class Recording:
     actors: list[ActorTrack] = field(default_factory=list)
     objects: list[RecordedObjects] = field(default_factory=list)
     scan_origins: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    reports: RobotReports = field(default_factory=RobotReports)
 
     @cached_property
     def tilt(self) -> FloatArray:
@@ -128,7 +131,7 @@ class Recording:
             arrays |= _stamped_arrays(name, getattr(self, name))
         arrays["scan_origins"] = self.scan_origins
         arrays |= grid_arrays(self.grids) | mesh_arrays(self.meshes) | track_arrays(self.actors)
-        arrays |= object_arrays(self.objects) | layer_arrays(self.layers)
+        arrays |= object_arrays(self.objects) | layer_arrays(self.layers) | self.reports.arrays()
         metadata: dict[str, Any] = {
             "scenario": self.scenario,
             "backend": self.backend,
@@ -138,6 +141,7 @@ class Recording:
             "wheel_radius": self.robot.wheel_radius,
             "frame_id": self.start.frame_id,
             "events": [event.to_json() for event in self.events],
+            "reports": self.reports.names(),
         }
         arrays["words"] = np.array(json.dumps(metadata))
         with replacing(file) as part, part.open("wb") as out:
@@ -215,4 +219,5 @@ def _recording_from(arrays: dict[str, Any]) -> Recording:
         actors=tracks_from(arrays),
         objects=objects_from(arrays),
         scan_origins=arrays.get("scan_origins", np.zeros((0, 3))),
+        reports=reports_from(arrays, metadata.get("reports", {})),
     )

@@ -20,6 +20,7 @@ from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import FloatArray
 from terrain.recording.metrics import measure
 from terrain.recording.recorded_maps import RecordedMesh
+from terrain.recording.recorded_robot import joined_reports
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import Recording, RecordingError
 
@@ -136,6 +137,7 @@ def read_parts(folder: Path) -> Recording:
             meshes=_with_surface(_joined(parts, "meshes")),
             layers=_joined(parts, "layers"),
             objects=_joined(parts, "objects"),
+            reports=joined_reports([part.reports for part in parts]),
             actors=[
                 replace(track, poses=np.concatenate([part.actors[number].poses for part in parts]))
                 for number, track in enumerate(parts[0].actors)

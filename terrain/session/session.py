@@ -29,13 +29,14 @@ from terrain.physics.command_delay import CommandDelay
 from terrain.physics.incidents import ANY_COLLISION, COLLISIONS_WITH, Incident
 from terrain.physics.simulation import Simulation
 from terrain.provenance.named_files import InputCopies
-from terrain.recording.recorder import Recorder
-from terrain.recording.robot_shape import RobotShape
+from terrain.recording.recorded_robot import Report, RobotShape, as_mount
+from terrain.recording.recorder import LOCAL_MAP_PERIOD, Recorder
 from terrain.scenarios.environment import with_noise
-from terrain.scenarios.faults import FaultSchedule
+from terrain.scenarios.faults import ODOMETRY, FaultSchedule
 from terrain.scenarios.scenario import Scenario, load_scenario
 from terrain.scenarios.sensors import AnyRobot, make_localization, make_proprioceptive_sensors, make_sensors
 from terrain.scenarios.settings import apply_world_settings
+from terrain.sensors.proprioception import WheelOdometryReading
 from terrain.sensors.rays import FellowRays
 from terrain.sensors.sensor import Sensor
 from terrain.session.navigation_config import write_navigation_config
@@ -134,12 +135,14 @@ class Session(SimulationSession):
         delay = CommandDelay(self.world.physics, self.robot.send_command, self.scenario.perturb.command_delay)
         self.recorder = self._make_recorder()
         self._scans = 0
+        self._next_local_map = 0.0
         super().__init__(simulation, self.localization, config_file, options, delay, self.site.clock)
         self.navigator.server.get_path.listeners.append(self._record_plan)
         self.navigator.server.refine_path.listeners.append(self._record_refined_plan)
         simulation.on_incident.append(self._report_incident)
         for incident in simulation.incidents:  # of the first instant
             self._report_incident(incident)
+        self.recorder.reports.mounts |= {name: as_mount(mount) for name, mount in self.sensor_mounts.items()}
         self.loop.on_sample.append(self._record_sample)
         self.loop.on_scan.append(self._record_scan)
 
@@ -184,8 +187,34 @@ class Session(SimulationSession):
         self.events.emit(EventKind.INCIDENT, "simulator", **incident.to_json())
 
     def _record_sample(self, time: float, pose: Pose, velocity: Twist) -> None:
-        self.recorder.sample(time, pose, velocity, self.navigator.server.runtime.gate.last_command)
+        server = self.navigator.server
+        self.recorder.sample(time, pose, velocity, server.runtime.gate.last_command, self._robot_report(velocity))
         self.recorder.tracked(time, self.tracked_objects)
+        if time >= self._next_local_map and isinstance(server, MapServer):
+            self._next_local_map = time + LOCAL_MAP_PERIOD
+            self._record_surroundings(time, server)
+
+    def _robot_report(self, velocity: Twist) -> Report:
+        """What the navigation has of the robot; without a sensor of odometry the measured velocity is the true one."""
+        transforms, robot = self.navigator.server.runtime.transforms, self.navigator.server.runtime.robot
+        reading: WheelOdometryReading | None = self.simulation.latest.get(ODOMETRY)
+        try:
+            T_map_base = transforms.lookup(self.recorder.start.frame_id, robot.robot_frame)
+            estimate = Pose(T_map_base.translation, T_map_base.rotation, T_map_base.parent)
+        except TransformError:
+            estimate = None
+        if reading is None:
+            return Report(estimate, None, velocity)
+        return Report(estimate, reading.pose, reading.odometry.velocity)
+
+    def _record_surroundings(self, time: float, server: MapServer) -> None:
+        try:
+            near = list(server.served.values())[-1].map
+            self.recorder.reports.outline(time, near.robot_outline)
+            if server.local_view:
+                self.recorder.reports.local_map(time, near.frame_id, server.map_view(server.local_view))
+        except Exception as error:  # as a map that refuses a scan, it must not stop the physics
+            self.events.emit(EventKind.FAULT, "local_map", type=type(error).__name__, message=str(error))
 
     def tracked_objects(self) -> list[TrackedObject]:
         """What the map knows that the robot drives on, without starting its updates; in the frame of the world."""
@@ -202,7 +231,9 @@ class Session(SimulationSession):
     def _record_scan(self, scan: RangeScan) -> None:
         self._scans += 1
         if self._scans % SCANS_PER_RECORDED == 1:
-            self.recorder.scan(scan.stamp, scan.points, scan.origin)
+            mounted = scan.source if scan.source in self.sensor_mounts else ""
+            orientation = self.simulation.robot.pose().orientation  # sensors are mounted straight
+            self.recorder.scan(scan.stamp, scan.points, scan.origin, mounted, orientation)
 
     def _record_refined_plan(self, handle: AnyGoalHandle) -> None:
         path = handle.result.refined_path if handle.result is not None else None

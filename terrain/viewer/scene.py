@@ -13,8 +13,8 @@ import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.recording.actor_track import ActorTrack
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recording import Recording
-from terrain.recording.robot_shape import RobotShape
 from terrain.viewer.pictures.colours import (
     ACTORS,
     BODY,

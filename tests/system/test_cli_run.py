@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 from mbf_abstract.geometry import Pose, Twist
 from terrain.commands.run import register
 from terrain.physics.robot_models import HUSKY
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import Recording
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 
 

@@ -20,9 +20,9 @@ from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import unix_seconds
 from terrain.recording.recorded_maps import RecordedGrid, RecordedMesh, add_if_changed
-from terrain.recording.recorder import MAP_PERIOD, MAX_GRID_CELLS, Recorder
+from terrain.recording.recorded_robot import Report, RobotShape, as_mount
+from terrain.recording.recorder import LOCAL_MAP_PERIOD, MAP_PERIOD, MAX_GRID_CELLS, Recorder
 from terrain.recording.recording import Recording
-from terrain.recording.robot_shape import RobotShape
 from terrain.viewer.foxglove.feeds import EventQueue
 
 BODY_HEIGHT = 0.3  # m, of a robot of which only the outline is known
@@ -65,7 +65,7 @@ class RobotFeed:
         self._events = EventQueue()
         self._scans: dict[str, RangeScan] = {}  # the newest of each sensor
         self._plans: deque[tuple[float, FloatArray]] = deque(maxlen=MAX_PLANS)
-        self._next_map = 0.0
+        self._next_map = self._next_local_map = 0.0
         self._grid = 0  # the last one, as a hash
         self._meshes: list[RecordedMesh] = []  # the first and the last
         session.events.add_sink(self._events)
@@ -90,7 +90,9 @@ class RobotFeed:
         velocity = self._velocity()
         grids, meshes = self._changed_maps(now)  # first: where it raises, what has come waits for the next part
         recorder = Recorder(self._name, self._server.config.backend, self._shape, pose, [])
-        recorder.sample(now + self._epoch, pose, velocity or Twist(), runtime.gate.last_command)
+        self._look_around(recorder, now)  # likewise
+        report = Report(pose, None, velocity)
+        recorder.sample(now + self._epoch, pose, velocity or Twist(), runtime.gate.last_command, report)
         while self._plans:
             recorder.path(*self._plans.popleft())
         self._place_scans(recorder)
@@ -113,13 +115,31 @@ class RobotFeed:
         scans, self._scans = self._scans, {}
         if not self.is_watched():
             return
-        runtime = self._server.runtime
+        robot, transforms = self._server.runtime.robot, self._server.runtime.transforms
         for scan in scans.values():
             try:
-                placed = scan.in_frame(runtime.robot.global_frame, runtime.transforms)
+                placed = scan.in_frame(robot.global_frame, transforms)
+                time, points, origin = scan.stamp + self._epoch, placed.points, placed.origin
+                if scan.frame_id in (robot.global_frame, robot.robot_frame) or scan.origin.any():
+                    recorder.scan(time, points, origin)  # it is not in the frame of a sensor
+                    continue
+                T_base_sensor = transforms.lookup(robot.robot_frame, scan.frame_id)
+                T_map_sensor = scan.transform_to(robot.global_frame, transforms)
             except TransformError:
                 continue  # it is older than what is known of the robot
-            recorder.scan(scan.stamp + self._epoch, placed.points, placed.origin)
+            recorder.reports.mounts[scan.frame_id] = as_mount(T_base_sensor)
+            recorder.scan(time, points, origin, scan.frame_id, T_map_sensor.rotation)
+
+    def _look_around(self, recorder: Recorder, now: float) -> None:
+        """Record the map around the robot, and its outline, if that was done some time ago."""
+        server = self._server
+        if now < self._next_local_map or not self.is_watched() or not isinstance(server, MapServer):
+            return
+        self._next_local_map = now + LOCAL_MAP_PERIOD
+        near = list(server.served.values())[-1].map
+        recorder.reports.outline(now + self._epoch, near.robot_outline)
+        if server.local_view:
+            recorder.reports.local_map(now + self._epoch, near.frame_id, server.map_view(server.local_view))
 
     def _changed_maps(self, now: float) -> tuple[list[RecordedGrid], list[RecordedMesh]]:
         """The map, if it has changed since it was looked at some seconds ago."""

@@ -6,6 +6,8 @@ messages in a file.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from foxglove_schemas_protobuf.Color_pb2 import Color
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
@@ -14,6 +16,7 @@ from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
 from foxglove_schemas_protobuf.Point3_pb2 import Point3
 from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.Pose_pb2 import Pose
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
 from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.TriangleListPrimitive_pb2 import TriangleListPrimitive
@@ -23,6 +26,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry import Pose as Place
 from terrain.recording.recorded_maps import RecordedGrid
 from terrain.viewer.pictures.colours import Colour
 from terrain.viewer.pictures.plan_picture import cost_colours
@@ -110,6 +114,17 @@ def poses_along(time: float, frame: str, line: FloatArray) -> PosesInFrame:
     turns = np.column_stack([np.zeros((len(line), 2)), np.sin(half), np.cos(half)])
     poses = [pose(*place) for place in zip(line, turns, strict=True)]
     return PosesInFrame(timestamp=timestamp(time), frame_id=frame, poses=poses)
+
+
+def poses(time: float, frame: str, places: Sequence[Place]) -> PosesInFrame:
+    """Return poses of the navigation."""
+    found = [pose(np.array(place.position), np.array(place.orientation)) for place in places]
+    return PosesInFrame(timestamp=timestamp(time), frame_id=frame, poses=found)
+
+
+def pose_in_frame(time: float, frame: str, row: FloatArray) -> PoseInFrame:
+    """Return a pose x y z qx qy qz qw (7,)."""
+    return PoseInFrame(timestamp=timestamp(time), frame_id=frame, pose=pose(row[:3], row[3:]))
 
 
 def point_cloud(time: float, frame: str, array: FloatArray) -> PointCloud:

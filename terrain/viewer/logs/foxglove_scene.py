@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorded_objects import RecordedObjects
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recording import Recording
-from terrain.recording.robot_shape import RobotShape
 from terrain.viewer.logs.foxglove_messages import colour, points, pose, timestamp, triangles
-from terrain.viewer.pictures.colours import ACTORS, BODY, DRIVEN, TRACKED, WHEEL, Colour
+from terrain.viewer.pictures.colours import ACTORS, BODY, DRIVEN, PLANNED, TRACKED, WHEEL, Colour
 from terrain.viewer.pictures.shading import vertex_colours
 from terrain.viewer.pictures.shapes import marks, robot_body, standing_things
 from terrain.worlds.surface import Surface
@@ -98,6 +98,23 @@ def track_piece(frame: str, number: int, time: float, line: FloatArray) -> Scene
             scale_invariant=True,
             points=points(line),
             color=colour(DRIVEN),
+        )
+    )
+    return SceneUpdate(entities=[entity])
+
+
+def footprint(frame: str, time: float, corners: FloatArray) -> SceneUpdate:
+    """The outline (k, 3) [m] of the robot, in its frame."""
+    entity = _entity(frame, "footprint")
+    entity.timestamp.CopyFrom(timestamp(time))
+    entity.lines.append(
+        LinePrimitive(
+            type=LinePrimitive.LINE_LOOP,
+            pose=pose(np.array([0.0, 0.0, LIFT]), UPRIGHT),
+            thickness=TRACK_WIDTH,
+            scale_invariant=True,
+            points=points(corners),
+            color=colour(PLANNED),
         )
     )
     return SceneUpdate(entities=[entity])

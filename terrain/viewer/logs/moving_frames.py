@@ -10,10 +10,11 @@ import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 
 from mbf_abstract.geometry import FloatArray
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recording import Recording
-from terrain.recording.robot_shape import RobotShape
 from terrain.viewer.logs import foxglove_messages as message
 from terrain.viewer.logs import foxglove_scene as scene
+from terrain.viewer.logs.robot_messages import reported_frames
 from terrain.viewer.scene import wheel_angles
 
 TRACK_PIECE = 5.0  # s
@@ -64,7 +65,8 @@ class MovingFrames:
             )
             for index, track in enumerate(part.actors)
         ]
-        return FrameTransforms(transforms=[body, *wheels, *actors])
+        reported = reported_frames(part.reports, self._frame, sample, time)
+        return FrameTransforms(transforms=[body, *wheels, *actors, *reported])
 
 
 class Track:

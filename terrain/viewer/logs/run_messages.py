@@ -1,20 +1,25 @@
 """A run as a stream of messages by topic, in Foxglove's schemas where there is one and as JSON where not.
 
-========== ================================ =====================================================
-topic      schema                           contents
-========== ================================ =====================================================
-/tf        foxglove.FrameTransforms         true pose of ``base_link``, of wheels and of actors
-/scene     foxglove.SceneUpdate             ground, walls, obstacles, marks, robot, actors, track
-/plan      foxglove.PosesInFrame            every plan the robot followed
-/scan      foxglove.PointCloud              what a range sensor hit
-/map       foxglove.Grid                    the map, where it is a grid
-/mesh_map  foxglove.SceneUpdate             the map, where it is a mesh, in the colours of its costs
-/log       foxglove.Log                     events as text
-/events    mbf.Event                        events as in events.jsonl
-/actions   mbf.ActionStates                 what each action does
-/motion    mbf.Motion                       speed, yaw rate, their commands, tilt, cross-track error
-/objects   foxglove.SceneUpdate             what the robot knows of things that move, with velocities
-========== ================================ =====================================================
+=============== ======================== =====================================================
+topic           schema                   contents
+=============== ======================== =====================================================
+/tf             foxglove.FrameTransforms true pose of ``base_link``, of its wheels and sensors, of actors; estimates
+/scene          foxglove.SceneUpdate     ground, walls, obstacles, marks, robot, actors, track
+/plan           foxglove.PosesInFrame    every plan the robot followed
+/goals          foxglove.PosesInFrame    the goals, in order
+/scan           foxglove.PointCloud      what a range sensor hit, in its frame
+/map            foxglove.Grid            the map, where it is a grid
+/mesh_map       foxglove.SceneUpdate     the map, where it is a mesh, in the colours of its costs
+/log            foxglove.Log             events as text
+/events         mbf.Event                events as in events.jsonl
+/actions        mbf.ActionStates         what each action does
+/motion         mbf.Motion               speed, yaw rate, their commands, tilt, cross-track error
+/local_map      foxglove.Grid            the map around the robot, where there is one
+/footprint      foxglove.SceneUpdate     outline with which the navigation plans
+/estimated_pose foxglove.PoseInFrame     where the localisation has the robot
+/odom           mbf.Odometry             odometry as in nav_msgs/Odometry
+/objects        foxglove.SceneUpdate     what the robot knows of things that move, with velocities
+=============== ======================== =====================================================
 
 ``RunMessages`` makes them of a recording, whole (run.mcap) or part by part while the run goes on (live).
 """
@@ -24,8 +29,8 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -34,6 +39,7 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.Grid_pb2 import Grid
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
@@ -45,6 +51,8 @@ from terrain.viewer.logs import foxglove_scene as scene
 from terrain.viewer.logs.event_messages import ActionStates, JsonMessage, event_message, log_message
 from terrain.viewer.logs.foxglove_mesh_costs import MeshCosts
 from terrain.viewer.logs.moving_frames import MovingFrames, Track
+from terrain.viewer.logs.robot_messages import RobotMessages, scan_messages
+from terrain.viewer.logs.stamped import Stamped
 from terrain.viewer.reports.timeline import ACTIONS
 
 MAX_PIECES = 2000  # of the track, some three hours of driving; then the oldest are replaced
@@ -54,6 +62,7 @@ JSON_FIELDS: dict[str, dict[str, Any]] = {
     "mbf.Event": {"time": NUMBER, "kind": TEXT, "source": TEXT, "data": {"type": "object"}},
     "mbf.ActionStates": dict.fromkeys(ACTIONS, TEXT),
     "mbf.Motion": dict.fromkeys(MOTION, NUMBER),
+    "mbf.Odometry": {"frame_id": TEXT, "child_frame_id": TEXT, "pose": {"type": "object"}, "twist": {"type": "object"}},
 }
 TOPICS: dict[str, Any] = {
     "/tf": FrameTransforms,
@@ -63,6 +72,11 @@ TOPICS: dict[str, Any] = {
     "/map": Grid,
     "/mesh_map": SceneUpdate,
     "/objects": SceneUpdate,
+    "/goals": PosesInFrame,
+    "/local_map": Grid,
+    "/footprint": SceneUpdate,
+    "/estimated_pose": PoseInFrame,
+    "/odom": "mbf.Odometry",
     "/log": Log,
     "/events": "mbf.Event",
     "/actions": "mbf.ActionStates",
@@ -81,27 +95,6 @@ def bytes_of(made: Any) -> bytes:
     if isinstance(made, JsonMessage):
         return json.dumps(made.values, sort_keys=True, allow_nan=False).encode()
     return bytes(made.SerializeToString(deterministic=True))
-
-
-@dataclass(frozen=True, eq=False)
-class Stamped:
-    """A message that has not been made yet: much of a live run is looked at by nobody.
-
-    Attributes
-    ----------
-    time : float
-        [s] of the run.
-    make : callable
-        Returns the protobuf message or the ``JsonMessage``.
-    part : str, optional
-        Which part of the present state it shows, so that one who comes later needs the newest message of each part;
-        None of messages that only matter at their time.
-    """
-
-    time: float
-    topic: str
-    make: Callable[[], Any]
-    part: str | None = None
 
 
 def messages_of(recording: Recording) -> list[Stamped]:
@@ -125,6 +118,7 @@ class RunMessages:
         self._began = began
         self._frame, self._height = first.start.frame_id, first.start.z + message.MAP_LIFT
         self._scene: list[Stamped] | None = list(_static_scene(first, began))
+        self._robot = RobotMessages(self._frame, self._height)
         self._moving = MovingFrames(first.robot, self._frame)
         self._track = Track()
         self._mesh = MeshCosts(self._frame)
@@ -138,7 +132,8 @@ class RunMessages:
             self._moving_frames(part),
             self._pieces(self._track.take(part.times, part.poses)),
             self._plans(part),
-            self._seen(part),
+            scan_messages(part, self._frame),
+            self._robot.take(part, self._began),
             self._maps(part),
             self._objects(part),
             self._events(part.events),
@@ -171,10 +166,6 @@ class RunMessages:
         for time, line in part.paths:
             if len(line):
                 yield Stamped(time, "/plan", partial(message.poses_along, time, self._frame, line), part="")
-
-    def _seen(self, part: Recording) -> Iterator[Stamped]:
-        for time, points in part.scans:
-            yield Stamped(time, "/scan", partial(message.point_cloud, time, self._frame, points), part="")
 
     def _maps(self, part: Recording) -> Iterator[Stamped]:
         for grid in part.grids:

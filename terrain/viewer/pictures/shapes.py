@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recording import Recording
-from terrain.recording.robot_shape import RobotShape
 from terrain.viewer.pictures.colours import GOAL, OBSTACLE, START, WALL, Colour
 from terrain.viewer.pictures.storeys import storeys
 from terrain.worlds.surface import Surface

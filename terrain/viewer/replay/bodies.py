@@ -8,7 +8,7 @@ import numpy as np
 
 from mbf_abstract.geometry import FloatArray
 from terrain.recording.actor_track import ActorTrack
-from terrain.recording.robot_shape import RobotShape
+from terrain.recording.recorded_robot import RobotShape
 from terrain.viewer.pictures.colours import ACTORS, OBSTACLE, WHEEL, Colour
 from terrain.viewer.pictures.shapes import prism, robot_body
 from terrain.viewer.replay.packing import Packer

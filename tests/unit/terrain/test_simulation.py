@@ -16,7 +16,7 @@ from terrain.physics.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpe
 from terrain.physics.robots import WheeledRobot
 from terrain.physics.simulation import Simulation
 from terrain.physics.world import BulletWorld
-from terrain.recording.robot_shape import RobotShape
+from terrain.recording.recorded_robot import RobotShape
 from terrain.scenarios.actors import random_route
 from terrain.sensors.lidar import Lidar, LidarModel, planar_directions
 from terrain.sensors.proprioception import Imu, WheelOdometry

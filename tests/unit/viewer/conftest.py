@@ -16,9 +16,9 @@ from mbf_abstract.geometry import Pose, Twist
 from terrain.physics.robot_models import HUSKY, TURTLEBOT
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.joint_recording import JointRecording
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import Recording
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.scenarios.scenario import PlanarPose, Scenario, Sensor, load_scenario
 from terrain.scenarios.world_types import GeneratedWorld

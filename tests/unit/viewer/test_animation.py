@@ -11,8 +11,8 @@ from PIL import Image
 
 from mbf_abstract.geometry import Pose
 from terrain.physics.robot_models import HUSKY
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import Recorder
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.animation import FRAMES, SIZE, write_animation
 from terrain.viewer.pictures.colours import BODY, DRIVEN, OBSTACLE, PLANNED, SCAN

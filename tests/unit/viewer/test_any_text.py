@@ -24,8 +24,8 @@ from mbf_abstract.whole_files import replacing, write_whole
 from terrain.commands.live_line import LiveLine
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.metrics import measure
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import Recorder
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import judge
 from terrain.scenarios.limits import Limits
 from terrain.viewer import results

@@ -13,8 +13,8 @@ from terrain.physics.robot_models import HUSKY
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.clearance import clearances
 from terrain.recording.metrics import measure
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import Recorder
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.worlds.surface import box, cylinder
 

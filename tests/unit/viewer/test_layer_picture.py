@@ -12,9 +12,9 @@ from mbf_abstract.maps.view import MeshView
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.metrics import measure
 from terrain.recording.recorded_maps import RecordedLayer, layer_arrays, layers_from
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import MAP_PERIOD, Recorder
 from terrain.recording.recording import Recording
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.colours import WALL, cost_colours_up_to
 from terrain.viewer.pictures.layer_picture import NOWHERE, layer_picture_png, painted

@@ -7,8 +7,8 @@ import pytest
 
 from mbf_abstract.geometry import Twist
 from terrain.physics.robot_models import HUSKY
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import Recorder
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.logs.mcap_log import write_mcap
 from terrain.viewer.replay.replay_page import replay_html

@@ -18,9 +18,9 @@ from mbf_abstract.maps.view import GridView, MeshView
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorded_objects import RecordedObjects
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import MAP_PERIOD, Recorder
 from terrain.recording.recording import Recording
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.session.session import Session
 from terrain.viewer.logs.event_messages import ActionStates
@@ -32,6 +32,7 @@ SCHEMAS = {
     "/tf": "foxglove.FrameTransforms",
     "/scene": "foxglove.SceneUpdate",
     "/plan": "foxglove.PosesInFrame",
+    "/goals": "foxglove.PosesInFrame",
     "/scan": "foxglove.PointCloud",
     "/map": "foxglove.Grid",
     "/log": "foxglove.Log",

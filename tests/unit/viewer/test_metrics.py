@@ -23,8 +23,8 @@ from terrain.recording.metrics import (
     planning_times,
 )
 from terrain.recording.planning_times import PlanningTimes
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import Recorder
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.session.robot_run import success_by_path_length
 

@@ -12,8 +12,8 @@ from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.actor_track import ActorTrack
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import Recorder
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures import run_picture
 from terrain.viewer.pictures.colours import (

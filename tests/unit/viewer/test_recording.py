@@ -14,9 +14,9 @@ from mbf_abstract.maps.view import GridView, MeshView
 from terrain.physics.motion_sample import Thing
 from terrain.physics.robot_models import CAR, HUSKY, TURTLEBOT
 from terrain.recording.recorded_objects import AGE, IS_MOVING, NUMBER, VX, X, Y
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import MAP_PERIOD, MAX_GRID_CELLS, MAX_MESH_VERTICES, OBJECTS_PERIOD, Recorder
 from terrain.recording.recording import Recording, RecordingError
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.run_folder import PARTS, read_parts
 from terrain.recording.verdict import Verdict
 from terrain.scenarios.scenario import load_scenario

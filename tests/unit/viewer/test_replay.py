@@ -19,8 +19,8 @@ from terrain.physics.robot_models import HUSKY
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recorded_objects import RecordedObjects
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import Recorder
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.colours import FLEET
 from terrain.viewer.pictures.moving_picture import status_text

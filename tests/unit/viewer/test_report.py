@@ -13,8 +13,8 @@ from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.metrics import measure
+from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import Recorder
-from terrain.recording.robot_shape import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.run_picture import picture_png
 from terrain.viewer.reports.page import MAX_ROWS, cell

@@ -18,7 +18,7 @@ from terrain.viewer.logs.run_messages import TOPICS
 
 HERE = {"header": {"frame_id": "map"}}
 GOAL = {**HERE, "pose": {"position": {"x": 4.0, "y": 6.0, "z": 0.0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}}
-ON_A_MESH = [topic for topic in TOPICS if topic not in ("/map", "/objects")]  # no layer tracks what moves
+ON_A_MESH = [topic for topic in TOPICS if topic not in ("/map", "/local_map", "/objects")]  # no layer tracks what moves
 
 
 def finished(client):
