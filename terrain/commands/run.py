@@ -132,6 +132,7 @@ def run(
                 on_step=live.step,
                 on_note=live.note,
                 executive=executive,
+                geodesic=True,
                 write_views=partial(write_results, on_step=live.step),
                 write_joint_views=partial(write_joint_results, on_step=live.step),
             )

@@ -195,7 +195,7 @@ def _compare_with_geodesic(recording: Recording, world: ScenarioWorld, driven: f
     """Return the shortest path over all goals to where the robot stopped, and the ratio of the driven path to it."""
     goals = [goal.position for goal in recording.goals[:-1]]
     stops = [recording.start.position, *goals, tuple(recording.poses[-1, :3].tolist())]
-    shortest = geodesic_length(world.open_surface(), stops)
+    shortest = geodesic_length(world.open_surface(), stops, driven)
     if not 0.0 < shortest < float("inf"):
         return {}
     return {"geodesic_m": round(shortest, 6), "path_over_geodesic": round(driven / shortest, 6)}

@@ -8,6 +8,7 @@ across every face. It takes about 10 microseconds per face; planners of ``mbf_me
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -25,19 +26,25 @@ from terrain.worlds.surface import Surface, height_grid
 IntArray = NDArray[np.int64]
 
 POINTS_PER_EDGE = 3
+SLACK = 1.1
 SEARCH_RADIUS = 1.0  # m around a place in which its face is looked for
 FLOOR_CELL = 0.2  # m; width of the squares that a building's floor is made of
 
 
-def geodesic_length(surface: Surface, places: Sequence[Sequence[float]]) -> float:
+def geodesic_length(surface: Surface, places: Sequence[Sequence[float]], driven: float = math.inf) -> float:
     """Length [m] of the shortest path over a surface through places in their order, inf where there is none.
 
     Parameters
     ----------
     places : sequence of (3,) float
         On the surface, or up to a metre off it: then the nearest point counts.
+    driven : float
+        Length [m] of a path that leads through all of them; the shortest is looked for no farther afield, which
+        changes nothing but the time it takes.
     """
     faces = surface.faces.astype(np.int64)
+    if math.isfinite(driven):
+        faces = faces[_within_reach(surface.vertices, faces, np.array(places, dtype=float).reshape(-1, 3), driven)]
     points, nodes_of_faces, starts, ends = _graph(surface.vertices, faces)
     own = len(points) + np.arange(len(places))
     for number, place in zip(own.tolist(), places, strict=True):
@@ -51,6 +58,22 @@ def geodesic_length(surface: Surface, places: Sequence[Sequence[float]]) -> floa
     graph = coo_array((lengths, (starts, ends)), (len(points), len(points))).tocsr()
     legs = [dijkstra(graph, directed=False, indices=a)[b] for a, b in pairwise(own.tolist())]
     return float(np.sum(legs))
+
+
+def _within_reach(vertices: FloatArray, faces: IntArray, places: FloatArray, driven: float) -> NDArray[np.bool_]:
+    """Whether each face (F,) has a corner in reach of a leg: in the ellipsoid of paths that are not longer.
+
+    A leg can be as long as what was driven without the other legs, which are straight at best. ``SLACK`` covers
+    lengths that are measured from samples, and the error of the search; the longest edge, faces that stick out.
+    """
+    straight = norm(np.diff(places, axis=0))
+    triangles = vertices[faces]
+    longest = float(norm(triangles - np.roll(triangles, 1, axis=1)).max(initial=0.0))
+    reached = np.zeros(len(vertices), dtype=bool)
+    for start, end, length in zip(places[:-1], places[1:], straight, strict=True):
+        reach = SLACK * max(driven - float(straight.sum() - length), float(length)) + 2.0 * longest
+        reached |= norm(vertices - start) + norm(vertices - end) <= reach
+    return np.asarray(reached[faces].any(axis=1))
 
 
 def free_floor(grid: OccupancyGrid) -> Surface:

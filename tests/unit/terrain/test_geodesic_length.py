@@ -6,7 +6,10 @@ import math
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from terrain.worlds.generate import fractal_terrain
 from terrain.worlds.geodesics import free_floor, geodesic_length
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid
@@ -61,3 +64,24 @@ def test_there_is_no_way_to_where_no_surface_is():
     occupied[:, 8:12] = True
     floor = free_floor(OccupancyGrid(occupied, ~occupied, 0.2, 0.0, 0.0))
     assert geodesic_length(floor, [(1.0, 1.0, 0.0), (3.0, 1.0, 0.0)]) == math.inf
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    seed=st.integers(0, 1000),
+    stops=st.lists(st.tuples(st.floats(1.0, 9.0), st.floats(1.0, 7.0)), min_size=2, max_size=4),
+    detour=st.floats(1.0, 1.6),
+)
+def test_what_was_driven_bounds_the_search_and_not_the_length(seed, stops, detour):
+    """Holes are in the way, so that the shortest path is longer than the straight line."""
+    rng = np.random.default_rng(seed)
+    terrain = fractal_terrain(10.0, 8.0, 0.4, rng, median_slope=12.0)
+    whole = terrain.surface()
+    kept = rng.uniform(size=len(whole.faces)) > 0.15
+    surface = Surface(whole.vertices, whole.faces[kept])
+    places = [(x, y, float(terrain.height_at(x, y))) for x, y in stops]
+
+    length = geodesic_length(surface, places)
+
+    if math.isfinite(length):
+        assert geodesic_length(surface, places, detour * length) == length
