@@ -27,6 +27,7 @@ from numba import config, njit
 from numba.core import event
 
 from mbf_abstract.compiling.compilation import CompilerClock
+from mbf_abstract.compiling.garbage import PatientCollector
 from mbf_abstract.compiling.shared_cache import share_cache
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True}
@@ -118,9 +119,14 @@ class _CompilerWatch(event.Listener):  # type: ignore[misc]
 
     def __init__(self) -> None:
         self._clock = CompilerClock()
+        self._collector = PatientCollector()
+        self._depth = 0
 
     def on_start(self, event: event.Event) -> None:
         """A compilation begins, perhaps within another one."""
+        self._depth += 1
+        if self._depth == 1:
+            self._collector.begin()
         dispatcher = event.data["dispatcher"]
         function = dispatcher.py_func
         self._clock.start(f"{function.__module__}.{function.__qualname__}", dispatcher.stats.cache_path is not None)
@@ -128,6 +134,9 @@ class _CompilerWatch(event.Listener):  # type: ignore[misc]
     def on_end(self, _event: event.Event) -> None:
         """A compilation has ended, or failed."""
         self._clock.end()
+        self._depth -= 1
+        if self._depth == 0:
+            self._collector.end()
 
 
 event.register("numba:compile", _CompilerWatch())

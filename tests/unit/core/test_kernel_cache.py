@@ -12,6 +12,7 @@ import pytest
 
 from mbf_abstract.compiling import kernel_cache
 from mbf_abstract.compiling.compilation import record_compilations
+from mbf_abstract.compiling.garbage import NEW_OBJECTS
 from mbf_abstract.compiling.kernel_cache import compile_lazily
 
 DECORATOR = "from mbf_abstract.compiling.kernel_cache import compile_lazily as kernel\n"
@@ -91,16 +92,23 @@ def test_the_code_of_earlier_sources_is_removed_and_that_of_todays_is_kept_besid
         assert len({file.parents[1] for file in (kernels / "__pycache__").rglob("*.nbc")}) == 1
 
 
-def test_a_compilation_leaves_the_garbage_collector_alone():
+@pytest.mark.parametrize(("usual", "expected"), [(700, NEW_OBJECTS), (NEW_OBJECTS + 1, NEW_OBJECTS + 1), (0, 0)])
+def test_garbage_is_looked_for_less_often_while_a_kernel_is_compiled_and_then_as_before(usual, expected):
     during = []
 
     @numba.extending.overload(call_in_a_process_of_its_own)
     def note_the_collector(_value):
-        during.append(gc.isenabled())
+        during.append((gc.isenabled(), gc.get_threshold()[0]))
 
-    with pytest.raises(numba.TypingError):
-        compile_lazily(lambda value: call_in_a_process_of_its_own(value))(1)
-    assert during and all(during)
+    before = gc.get_threshold()
+    gc.set_threshold(usual, *before[1:])
+    try:
+        with pytest.raises(numba.TypingError):  # a failed compilation ends like another
+            compile_lazily(lambda value: call_in_a_process_of_its_own(value))(1)
+        assert during and set(during) == {(True, expected)}
+        assert gc.get_threshold() == (usual, *before[1:])
+    finally:
+        gc.set_threshold(*before)
 
 
 def test_without_a_folder_to_write_to_kernels_are_compiled_anew_and_a_warning_says_what_to_set():
