@@ -8,10 +8,12 @@ cast, not what it hits.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from terrain.kernels.compiled import kernel
+from terrain.kernels.compiled import inner_kernel, kernel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -21,7 +23,25 @@ WIDTH = 8
 OCTANTS = 8
 
 
-@kernel
+class BoxesOfFaces(NamedTuple):
+    """The box of each triangle: min, max and middle (n, 3) [m], and by how much [m] a box is made larger."""
+
+    lower: FloatArray
+    upper: FloatArray
+    centres: FloatArray
+    margin: float
+
+
+class Memory(NamedTuple):
+    """Triangles (n,) in the order of the leaves, the part of each node (nodes, 2), its cuts (9,) and a row (8,)."""
+
+    order: OrderArray
+    spans: OrderArray
+    cuts: OrderArray
+    along: FloatArray
+
+
+@inner_kernel
 def halve(centres: FloatArray, order: OrderArray, first: int, end: int) -> int:
     """Sort ``order[first:end]`` into two halves of whole leaves that lie apart, and return where the second begins."""
     axis, longest = 0, -1.0
@@ -56,7 +76,7 @@ def halve(centres: FloatArray, order: OrderArray, first: int, end: int) -> int:
     return middle
 
 
-@kernel
+@inner_kernel
 def cut(centres: FloatArray, order: OrderArray, cuts: OrderArray) -> int:
     """Cut the triangles between the first two ``cuts`` into up to eight, write theirs and return how many they are."""
     parts = 1
@@ -70,7 +90,7 @@ def cut(centres: FloatArray, order: OrderArray, cuts: OrderArray) -> int:
     return parts
 
 
-@kernel
+@inner_kernel
 def write_box(
     box: FloatArray, lane: int, lower: FloatArray, upper: FloatArray, order: OrderArray, margin: float
 ) -> None:
@@ -82,7 +102,7 @@ def write_box(
         box[axis, lane], box[3 + axis, lane] = low - margin, high + margin
 
 
-@kernel
+@inner_kernel
 def write_leaf(leaf: FloatArray, vertices: FloatArray, faces: IntArray, order: OrderArray) -> None:
     """Write a corner and the two sides from it of every triangle of ``order`` into ``leaf`` (9, 8)."""
     for lane in range(len(order)):
@@ -93,10 +113,9 @@ def write_leaf(leaf: FloatArray, vertices: FloatArray, faces: IntArray, order: O
             leaf[6 + axis, lane] = vertices[faces[order[lane], 2], axis] - corner
 
 
-@kernel
-def write_far_first(ranks: NDArray[np.uint8], box: FloatArray, parts: int) -> None:
+@inner_kernel
+def write_far_first(ranks: NDArray[np.uint8], box: FloatArray, parts: int, along: FloatArray) -> None:
     """Write for rays into each octant in which order they leave the children in ``box`` behind, the last one first."""
-    along = np.empty(WIDTH, dtype=np.float64)
     for octant in range(OCTANTS):
         for lane in range(WIDTH):
             along[lane] = 0.0 if lane < parts else -np.inf
@@ -111,9 +130,10 @@ def write_far_first(ranks: NDArray[np.uint8], box: FloatArray, parts: int) -> No
             ranks[octant, rank] = lane
 
 
-@kernel
 def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, NDArray[np.uint8], FloatArray]:
     """Build the tree over ``faces`` (n >= 1, 3) of ``vertices`` (m, 3) [m].
+
+    All memory is taken here: each kind of array that a kernel makes costs a first start as much as a short kernel.
 
     Returns
     -------
@@ -127,33 +147,39 @@ def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntAr
     leaves : (leaves, 9, 8) float64
         A corner and the two sides from it of every triangle; those that do not exist are points.
     """
-    lower, upper = np.empty((len(faces), 3), dtype=np.float64), np.empty((len(faces), 3), dtype=np.float64)
-    centres = np.empty((len(faces), 3), dtype=np.float64)
-    for face in range(len(faces)):
-        for axis in range(3):
-            a, b, c = vertices[faces[face, 0], axis], vertices[faces[face, 1], axis], vertices[faces[face, 2], axis]
-            lower[face, axis], upper[face, axis] = min(a, b, c), max(a, b, c)
-            centres[face, axis] = 0.5 * (lower[face, axis] + upper[face, axis])
-    order, largest = np.arange(len(faces)), 1.0
-    for vertex in range(len(vertices)):
-        for axis in range(3):
-            largest = max(largest, abs(vertices[vertex, axis]))
-    margin = 1e-9 * largest
+    a, b, c = vertices[faces[:, 0]], vertices[faces[:, 1]], vertices[faces[:, 2]]
+    lower, upper = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    margin = 1e-9 * max(1.0, float(np.abs(vertices).max()))
     leaf_count = (len(faces) + WIDTH - 1) // WIDTH
     most = leaf_count + 1  # a node has at least two children, but for the one above the root
-    boxes, leaves = np.empty((most, 6, WIDTH), dtype=np.float64), np.zeros((leaf_count, 9, WIDTH), dtype=np.float64)
+    boxes, leaves = np.full((most, 6, WIDTH), np.nan), np.zeros((leaf_count, 9, WIDTH))
     children = np.zeros((most, WIDTH), dtype=np.int32)
     far_first = np.empty((most, OCTANTS, WIDTH), dtype=np.uint8)
-    spans = np.empty((most, 2), dtype=np.int64)
+    memory = Memory(np.arange(len(faces)), np.empty((most, 2), np.int64), np.empty(WIDTH + 1, np.int64), np.empty(WIDTH))
+    boxes_of_faces = BoxesOfFaces(lower, upper, 0.5 * (lower + upper), margin)
+    nodes = fill_tree(boxes, children, far_first, leaves, vertices, faces, boxes_of_faces, memory)
+    return boxes[:nodes].copy(), children[:nodes].copy(), far_first[:nodes].copy(), leaves
+
+
+@kernel
+def fill_tree(
+    boxes: FloatArray,
+    children: IntArray,
+    far_first: NDArray[np.uint8],
+    leaves: FloatArray,
+    vertices: FloatArray,
+    faces: IntArray,
+    boxes_of_faces: BoxesOfFaces,
+    memory: Memory,
+) -> int:
+    """Write what ``build_tree`` returns and return the number of nodes; ``boxes`` begin as NaN, ``leaves`` as 0."""
+    order, spans, cuts, along = memory
+    lower, upper, centres, margin = boxes_of_faces
     spans[0, 0], spans[0, 1] = 0, len(faces)
-    cuts = np.empty(WIDTH + 1, dtype=np.int64)
     node, node_count, written = 0, 1, 0
     while node < node_count:
         cuts[0], cuts[1] = spans[node, 0], spans[node, 1]
         parts = cut(centres, order, cuts) if node > 0 else 1
-        for side in range(6):
-            for lane in range(WIDTH):
-                boxes[node, side, lane] = np.nan
         for lane in range(parts):
             within = order[cuts[lane] : cuts[lane + 1]]
             write_box(boxes[node], lane, lower, upper, within, margin)
@@ -165,6 +191,6 @@ def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntAr
                 spans[node_count, 0], spans[node_count, 1] = cuts[lane], cuts[lane + 1]
                 children[node, lane] = node_count
                 node_count += 1
-        write_far_first(far_first[node], boxes[node], parts)
+        write_far_first(far_first[node], boxes[node], parts, along)
         node += 1
-    return boxes[:node_count].copy(), children[:node_count].copy(), far_first[:node_count].copy(), leaves
+    return node_count
