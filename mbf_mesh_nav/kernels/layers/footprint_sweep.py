@@ -101,49 +101,61 @@ def uses_along(
 
 
 @inner_kernel
-def edge_use(surface: Surface, chassis: Chassis, scratch: Scratch, begin: int, end: int) -> float:
-    """``greatest_use`` from one vertex to its neighbour; inf where no face beside the edge carries a wheel."""
-    best, best_z = Count(-1), LEAST_UPWARD
-    for position in range(surface.vertex_face_offsets[begin], surface.vertex_face_offsets[begin + 1]):
-        face = Count(surface.vertex_faces[position])
-        corners = surface.faces[face]
-        beside = corners[0] == end or corners[1] == end or corners[2] == end
-        if beside and surface.face_normals[face, 2] >= best_z:
-            best, best_z = face, surface.face_normals[face, 2]
-    start, goal = row(surface.vertices, Count(begin)), row(surface.vertices, Count(end))
-    x, y = goal[0] - start[0], goal[1] - start[1]
-    length = math.sqrt(x * x + y * y)
-    if best < 0 or length == 0.0:
-        return np.inf
-    return greatest_use(surface, chassis, scratch, best, start, goal, x / length, y / length)
+def move_use(surface: Surface, chassis: Chassis, scratch: Scratch, begin: int, end: int, share: float) -> float:
+    """``greatest_use`` of the straight move from a vertex to another; inf where no face carries a wheel.
 
+    With ``share`` NaN they are neighbours, and the move goes along their edge. Else ``end`` is the far corner of the
+    face beyond one at ``begin``, and the edge between both faces is crossed at that share of its length.
 
-@inner_kernel
-def stride_use(surface: Surface, chassis: Chassis, scratch: Scratch, begin: int, end: int, share: float) -> float:
-    """``greatest_use`` from a vertex to the far corner of the face beyond one of its own; inf where there is none.
-
-    The edge between both faces is crossed at ``share`` of its length.
+    Both kinds are one kernel, as each that calls the sweep is compiled with all of it (decision 0086).
     """
     start, goal = row(surface.vertices, Count(begin)), row(surface.vertices, Count(end))
     x, y = goal[0] - start[0], goal[1] - start[1]
     length = math.sqrt(x * x + y * y)
+    face, beyond, middle = Count(-1), Count(-1), goal
+    if not np.isnan(share):
+        face, side = _face_towards(surface, begin, end)
+        if face >= 0:
+            beyond = Count(surface.face_neighbours[face, side])
+            a = row(surface.vertices, Count(surface.faces[face, side]))
+            b = row(surface.vertices, Count(surface.faces[face, (side + 1) % 3]))
+            middle = (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * (b[2] - a[2]))
+    elif length > 0.0:
+        face = _face_beside(surface, begin, end)
+    if face < 0:
+        return np.inf
+    use = greatest_use(surface, chassis, scratch, face, start, middle, x / length, y / length)
+    if beyond >= 0:
+        use = max(use, greatest_use(surface, chassis, scratch, beyond, middle, goal, x / length, y / length))
+    return float(use)
+
+
+@inner_kernel
+def _face_beside(surface: Surface, begin: int, end: int) -> int:
+    """The flattest of the faces beside an edge that carry a wheel; -1: none does."""
+    best, best_z = Count(-1), LEAST_UPWARD
+    for position in range(surface.vertex_face_offsets[begin], surface.vertex_face_offsets[begin + 1]):
+        face = Count(surface.vertex_faces[position])
+        for corner in range(3):
+            if surface.faces[face, corner] == end and surface.face_normals[face, 2] >= best_z:
+                best, best_z = face, surface.face_normals[face, 2]
+    return best  # type: ignore[no-any-return]
+
+
+@inner_kernel
+def _face_towards(surface: Surface, begin: int, end: int) -> tuple[int, int]:
+    """The face at a vertex beyond which there is one with the corner ``end``, and the side between; -1: none."""
     for position in range(surface.vertex_face_offsets[begin], surface.vertex_face_offsets[begin + 1]):
         face = Count(surface.vertex_faces[position])
         for corner in range(3):
             if surface.faces[face, corner] != begin:
                 continue
-            left, right = surface.faces[face, (corner + 1) % 3], surface.faces[face, (corner + 2) % 3]
-            beyond = Count(surface.face_neighbours[face, (corner + 1) % 3])
-            if beyond < 0:
-                continue
-            corners = surface.faces[beyond]
-            if corners[0] == end or corners[1] == end or corners[2] == end:
-                a, b = row(surface.vertices, Count(left)), row(surface.vertices, Count(right))
-                crossing = (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * (b[2] - a[2]))
-                first = greatest_use(surface, chassis, scratch, face, start, crossing, x / length, y / length)
-                last = greatest_use(surface, chassis, scratch, beyond, crossing, goal, x / length, y / length)
-                return max(first, last)
-    return np.inf
+            side = Count((corner + 1) % 3)
+            beyond = surface.face_neighbours[face, side]
+            for other in range(3):
+                if beyond >= 0 and surface.faces[beyond, other] == end:
+                    return face, side
+    return Count(-1), Count(-1)
 
 
 @inner_kernel

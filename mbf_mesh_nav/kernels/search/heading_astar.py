@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.layers.chassis import Chassis, Scratch
-from mbf_mesh_nav.kernels.layers.footprint_sweep import edge_use, stride_use
+from mbf_mesh_nav.kernels.layers.footprint_sweep import move_use
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 from mbf_mesh_nav.kernels.search.goal_bound import GoalBound, bound_at
@@ -145,9 +145,8 @@ def search_with_heading(
             following = neighbour * HEADINGS + new_heading
             if candidate < distances[following]:
                 if find_out and known[slot] == UNKNOWN:
-                    known[slot] = _may_drive(
-                        surface, chassis, scratch, Count(vertex), Count(neighbour), moves.shares[slot]
-                    )
+                    use = move_use(surface, chassis, scratch, Count(vertex), Count(neighbour), moves.shares[slot])
+                    known[slot] = DRIVABLE if use <= 1.0 else FORBIDDEN
                 if known[slot] == FORBIDDEN:
                     continue
                 distances[following] = candidate
@@ -172,19 +171,10 @@ def find_out_along(
         while moves.ends[slot] != following:
             slot += 1
         if known[slot] == UNKNOWN:
-            known[slot] = _may_drive(surface, chassis, scratch, Count(vertex), Count(following), moves.shares[slot])
+            use = move_use(surface, chassis, scratch, Count(vertex), Count(following), moves.shares[slot])
+            known[slot] = DRIVABLE if use <= 1.0 else FORBIDDEN
         drivable = drivable and known[slot] == DRIVABLE
     return drivable
-
-
-@inner_kernel
-def _may_drive(surface: Surface, chassis: Chassis, scratch: Scratch, vertex: int, end: int, share: float) -> int:
-    """``DRIVABLE`` or ``FORBIDDEN``, for the move from a vertex to another."""
-    if np.isnan(share):
-        use = edge_use(surface, chassis, scratch, vertex, end)
-    else:
-        use = stride_use(surface, chassis, scratch, vertex, end, share)
-    return DRIVABLE if use <= 1.0 else FORBIDDEN
 
 
 @inner_kernel
