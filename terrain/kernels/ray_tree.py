@@ -155,7 +155,9 @@ def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntAr
     boxes, leaves = np.full((most, 6, WIDTH), np.nan), np.zeros((leaf_count, 9, WIDTH))
     children = np.zeros((most, WIDTH), dtype=np.int32)
     far_first = np.empty((most, OCTANTS, WIDTH), dtype=np.uint8)
-    memory = Memory(np.arange(len(faces)), np.empty((most, 2), np.int64), np.empty(WIDTH + 1, np.int64), np.empty(WIDTH))
+    memory = Memory(
+        np.arange(len(faces)), np.empty((most, 2), np.int64), np.empty(WIDTH + 1, np.int64), np.empty(WIDTH)
+    )
     boxes_of_faces = BoxesOfFaces(lower, upper, 0.5 * (lower + upper), margin)
     nodes = fill_tree(boxes, children, far_first, leaves, vertices, faces, boxes_of_faces, memory)
     return boxes[:nodes].copy(), children[:nodes].copy(), far_first[:nodes].copy(), leaves

@@ -20,7 +20,6 @@ NOBODY = -1
 """Instead of the row of an object."""
 
 
-@kernel
 def meet(
     poses: Float32Array,
     yaw: float,
@@ -63,16 +62,40 @@ def meet(
         Row of the first object that the motion leads into at a time when the robot that stays is not touched by it;
         NOBODY if there is none.
     """
+    samples = poses.shape[2]
+    costs, touched = np.zeros(samples, np.float32), np.full(samples, NOBODY, np.int32)
+    directions = np.zeros((2, samples), np.float32)
+    write_encounters(poses, yaw, step_time, stride, box, objects, horizon, margin, costs, touched, directions)
+    return costs, touched
+
+
+@kernel
+def write_encounters(
+    poses: Float32Array,
+    yaw: float,
+    step_time: float,
+    stride: int,
+    box: Float32Array,
+    objects: Float32Array,
+    horizon: float,
+    margin: float,
+    costs: Float32Array,
+    touched: Int32Array,
+    directions: Float32Array,
+) -> None:
+    """Write what ``meet`` returns; ``costs`` begin as 0, ``touched`` as NOBODY, ``directions`` (2, samples) is memory.
+
+    Made here, each of these arrays would cost a first start as much as a short kernel.
+    """
     _, steps, samples = poses.shape
-    costs, touched = np.zeros(samples, dtype=np.float32), np.full(samples, NOBODY, dtype=np.int32)
     if len(objects) == 0:
-        return costs, touched
+        return
     back, front, right, left, radius = box[0], box[1], box[2], box[3], box[4]
     extent = np.sqrt(max(-back, front) ** 2 + max(-right, left) ** 2) + radius + np.float32(margin)
     per_margin, zero, one = np.float32(1.0 / margin), np.float32(0.0), np.float32(1.0)
     cosine_now, sine_now = np.float32(np.cos(yaw)), np.float32(np.sin(yaw))
     is_disc = back == zero and front == zero and right == zero and left == zero
-    cosines, sines = np.ones(samples, dtype=np.float32), np.zeros(samples, dtype=np.float32)
+    cosines, sines = directions[0], directions[1]
     for t in range(stride - 1, steps, stride):
         time = np.float32((t + 1) * step_time)
         if time >= horizon:
@@ -85,9 +108,8 @@ def meet(
             square = xs[n] * xs[n] + ys[n] * ys[n]
             farthest = square if square > farthest else farthest
         farthest = np.sqrt(farthest)
-        if not is_disc:
-            for n in range(samples):
-                cosines[n], sines[n] = np.cos(yaws[n]), np.sin(yaws[n])
+        for n in range(samples):
+            cosines[n], sines[n] = (one, zero) if is_disc else (np.cos(yaws[n]), np.sin(yaws[n]))
         for k in range(len(objects)):
             # 2. Where the object is by now; nobody meets one that is out of reach.
             x, y = objects[k, X] + time * objects[k, VX], objects[k, Y] + time * objects[k, VY]
@@ -112,4 +134,3 @@ def meet(
                 cost = urgency * (near - staying)
                 costs[n] = cost if cost > costs[n] else costs[n]
                 touched[n] = k if touched[n] == NOBODY and gap < zero and not is_touched else touched[n]
-    return costs, touched
