@@ -73,6 +73,12 @@ class ControlCycle:
             return first_refused(self.costmap, self.footprint, self.request.pose, poses)
         return self.footprint.first_collision(self.costmap, poses)
 
+    def first_collision_of_turn(self, poses: FloatArray) -> int:
+        """As ``first_collision``, for poses of a turn on the spot."""
+        return (
+            self.first_collision(poses) if self.touches else self.footprint.first_collision_of_turn(self.costmap, poses)
+        )
+
 
 class PathFollower(CostmapController):
     """Base of the controllers: keeps the plan, checks frame, map and collision once, decides on arrival."""

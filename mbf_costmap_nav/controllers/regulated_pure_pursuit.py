@@ -245,6 +245,6 @@ class RegulatedPurePursuitController(RegulatedFollower):
         resolution = cycle.costmap.resolution
         step = SWEEP_STEP * resolution / max(cycle.footprint.footprint.circumscribed_radius, resolution)
         poses = swept_poses(cycle.request.pose, math.copysign(angle, command.wz), step)
-        hit = cycle.first_collision(poses)
+        hit = cycle.first_collision_of_turn(poses)
         x, y, yaw = poses[hit]
         return obstacle_text(f"({x:.2f}, {y:.2f}, {yaw:.2f} rad)") if hit >= 0 else ""

@@ -62,13 +62,18 @@ def obstacle_ahead(
     collision = (LETHAL,) if may_overhang else (LETHAL, OUTSIDE)
     check = _check(footprint, costmap.resolution)
     allowed, _ = blocked_at(pose.x, pose.y, pose.yaw)
-    deepest = np.inf if leaves_collisions else touched_depth(costmap, footprint, pose.x, pose.y, pose.yaw) + ROUNDING
+    deepest = np.inf
+    if allowed > 0 and not leaves_collisions:
+        deepest = touched_depth(costmap, footprint, pose.x, pose.y, pose.yaw) + ROUNDING
     on_map = costmap.contains(pose.x, pose.y)
     outline_speed = command.speed + abs(command.wz) * footprint.circumscribed_radius
     step = float(np.clip(0.5 * costmap.resolution / max(outline_speed, 1e-6), duration / 100.0, duration))
     if step < duration:
         step = CYCLE / math.ceil(CYCLE / step)
     ahead = arc_poses((pose.x, pose.y, pose.yaw), command.vx, command.vy, command.wz, duration, step)
+    if allowed == 0 and _stays_inside(costmap, footprint, ahead):
+        first = check.first_collision(costmap, ahead)
+        ahead = ahead[first:] if first >= 0 else ahead[:0]
     for x, y, yaw in ahead.tolist():
         blocked, covered = blocked_at(x, y, yaw)
         deeper = blocked > allowed and (allowed > 0 or check.cost(costmap, x, y, yaw) in collision)
@@ -78,6 +83,13 @@ def obstacle_ahead(
             return obstacle_text(f"({x:.2f}, {y:.2f}, {yaw:.2f} rad)")
         allowed = allowed if blocked else 0
     return ""
+
+
+def _stays_inside(costmap: Costmap, footprint: Footprint, poses: FloatArray) -> bool:
+    """Whether all of a footprint with an area stays on the map at poses (n, 3: x, y, yaw)."""
+    reach = footprint.circumscribed_radius + costmap.resolution
+    low, high = poses[:, :2].min(axis=0) - reach, poses[:, :2].max(axis=0) + reach
+    return len(footprint.vertices) > 2 and costmap.contains(*low.tolist()) and costmap.contains(*high.tolist())
 
 
 def first_refused(costmap: Costmap, check: FootprintCheck, pose: Pose, poses: FloatArray) -> int:
