@@ -32,8 +32,8 @@ def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
     return [
         (_column_distances, (cells, 0, 0, cells, cost)),
         (_spread_rows, (cells, (0, 0, 0, 0), cells, 0, 0, 0, row, cost)),
-        (_fill, (cells, _example(np.uint64, 2), row)),
-        (_search, (records, 0, table, 0, 0, 0.0, True, True, row, buckets)),
+        (_fill, (cells, _example(np.uint64, 2), row, box)),
+        (_search, (records, 0, table, 0, 0, 0.0, True, True, row, buckets, box)),
         (trace_cells, (PaddedGrid(row, 0, table), records["g"], 0, True)),
         (cost_along, (costs, 0, 0.0, 0.0, 0.0, 0.0)),
         (collisions, (costs, 0.0, 0.0, 0.0, points, points)),

@@ -24,7 +24,7 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_costmap_nav.kernels.search.grid_line import line_cost, pull_string
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND
 from mbf_costmap_nav.kernels.search.short_lines import trace_lines
-from mbf_costmap_nav.kernels.search.theta_star import theta_search
+from mbf_costmap_nav.kernels.search.theta_star import new_labels, theta_search
 from mbf_costmap_nav.planning.grid_planning import NO_LEG, GridPlanner, Leg
 from mbf_costmap_nav.planning.search_grid import GridPlannerParameters, SearchGrid
 
@@ -50,7 +50,7 @@ class ThetaStarPlanner(GridPlanner):
         """Search, then shorten by string pulling."""
         goal_cell, source = grid.cell_of(goal), grid.index(grid.cell_of(start))
         last, flag = grid.index(goal_cell), grid.token.flag
-        status, g, origin = theta_search(grid.padded, source, last, flag)
+        status, g, origin = theta_search(grid.padded, source, last, flag, *grid.memory(new_labels))
         if status == CANCELED:
             return NO_LEG
         end = goal_cell if status == FOUND else grid.nearest_reached(g, goal, tolerance)

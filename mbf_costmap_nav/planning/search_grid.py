@@ -6,7 +6,9 @@ When to use: by planners that search over cells. When not: anything that only lo
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +20,10 @@ from mbf_costmap_nav.grid.costmap import LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.kernels.map.line_cells import cost_along
 from mbf_costmap_nav.kernels.search.nearest_cell import nearest_reached
 from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid, pad_cells
-from mbf_costmap_nav.kernels.search.search_cells import Records, new_records
+from mbf_costmap_nav.kernels.search.search_cells import Box, whole_grid
 
 Cell = tuple[int, int]
+Memory = TypeVar("Memory")
 
 NO_ROBOT = np.zeros((0, 2))
 """Footprint samples of a robot that fits everywhere."""
@@ -45,19 +48,35 @@ class GridPlannerParameters(PluginParameters):
 
 
 class SearchWorkspace:
-    """Memory of one planner's grid searches, kept from plan to plan.
+    """Memory of one planner's grid searches, which are all of one kind, kept from plan to plan.
 
     Getting fresh pages from the system takes a tenth of a search, and twice as long as a search if others used them.
+    While the map stays the same, a search cleans up only after the one before: on large maps that is the smaller part.
     """
 
     def __init__(self) -> None:
-        self._records = new_records(0)
+        self._memory: Any = None
+        self._touched = np.zeros(4, dtype=np.int64)
+        self._searched: NDArray[np.uint8] | None = None  # the padded cells that the memory was written for
+        self._costmap: Costmap | None = None
+        self._padded = np.zeros(0, dtype=np.uint8)
 
-    def records(self, count: int) -> Records:
-        """Return ``count`` uninitialised records, the same ones for the same count."""
-        if len(self._records) != count:
-            self._records = new_records(count)
-        return self._records
+    def padded_cells(self, costmap: Costmap, token: CancelToken) -> NDArray[np.uint8]:
+        """Return the padded cells of a snapshot, the same ones as long as it is the same."""
+        if costmap is self._costmap:
+            return self._padded
+        padded = pad_cells(costmap.cells, LETHAL, token.flag)
+        if not (costmap.cells.flags.writeable or token.cancelled):  # cells that stay, and all of them
+            self._costmap, self._padded = costmap, padded
+        return padded
+
+    def memory(self, grid: PaddedGrid, make: Callable[[int], Memory]) -> tuple[Memory, Box]:
+        """Memory of a kind for a search on a grid, and the box of what is to be written anew, to be kept up to date."""
+        if self._searched is not grid.cells:
+            if self._searched is None or self._searched.size != grid.cells.size:
+                self._memory = make(grid.cells.size)
+            self._searched, self._touched = grid.cells, whole_grid(grid.cells, grid.stride)
+        return self._memory, self._touched
 
 
 @dataclass(frozen=True)
@@ -89,12 +108,13 @@ class SearchGrid:
     ) -> SearchGrid:
         """Prepare a snapshot with the costs of a planner."""
         table = traversal_table(parameters.cost_factor, parameters.lethal_cost, parameters.allow_unknown)
-        padded = PaddedGrid(pad_cells(costmap.cells, LETHAL, token.flag), costmap.width + 2, table)
-        return cls(costmap, padded, token, workspace or SearchWorkspace())
+        workspace = workspace or SearchWorkspace()
+        padded = PaddedGrid(workspace.padded_cells(costmap, token), costmap.width + 2, table)
+        return cls(costmap, padded, token, workspace)
 
-    def records(self) -> Records:
-        """Return memory for a search on this grid; it holds the records of the last one."""
-        return self.workspace.records(self.padded.cells.size)
+    def memory(self, make: Callable[[int], Memory]) -> tuple[Memory, Box]:
+        """Memory for a search on this grid, see ``SearchWorkspace``; it holds what the last one left there."""
+        return self.workspace.memory(self.padded, make)
 
     @property
     def geometry(self) -> NDArray[np.float64]:

@@ -19,9 +19,11 @@ from mbf_costmap_nav.kernels.search.search_cells import (
     CAME_SHIFT,
     KEPT_BITS,
     SLOT_BITS,
+    Box,
     Records,
     natural_steps,
     new_records,
+    whole_grid,
     write_records,
 )
 
@@ -42,6 +44,7 @@ def search(
     interpolated: bool,
     cancel_flag: NDArray[np.uint8],
     records: Records | None = None,
+    touched: Box | None = None,
 ) -> tuple[int, NDArray[np.float32]]:
     """Settle cells around ``start`` until ``goal`` is settled, or everything reachable if it cannot be reached.
 
@@ -61,6 +64,9 @@ def search(
         Polled at every row of the preparation and at every bucket.
     records : (n,) CELL, optional
         Memory to work in; what an earlier search in it returned is overwritten. Without it the search has its own.
+    touched : (4,) int64, optional
+        The box of records that an earlier search of this very grid has changed, so that only they are written anew;
+        replaced with that of this search. All are written without it.
 
     Returns
     -------
@@ -71,12 +77,16 @@ def search(
         at the boundary of the search. A view into the search's records, so not contiguous.
     """
     records = new_records(grid.cells.size) if records is None else records
-    write_records(grid.cells, grid.stride, cancel_flag, records)
+    whole = whole_grid(grid.cells, grid.stride)
+    touched = whole.copy() if touched is None else touched
+    write_records(grid.cells, grid.stride, cancel_flag, records, touched)
     buckets = np.empty((RING, max(FIRST_CAPACITY, grid.cells.size // CELLS_PER_ENTRY)), dtype=np.int32)
     stride, table = grid.stride, grid.table
     status = _search(
-        records, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, buckets
+        records, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, buckets, touched
     )
+    if heuristic_scale == 0.0 or cancel_flag[0] != 0:  # set while the records were written, it left some of them out
+        touched[:] = whole
     return status, records["g"]
 
 
@@ -92,8 +102,12 @@ def _search(
     interpolated: bool,
     cancel_flag: NDArray[np.uint8],
     buckets: NDArray[np.int32],
+    touched: Box,
 ) -> int:
-    """Fill ``g`` of the records, none of them reached, and return the status; ``buckets`` is any (RING, n)."""
+    """Fill ``g`` of the records, none of them reached, and return the status; ``buckets`` is any (RING, n).
+
+    ``touched`` becomes the box of cells that were reached, where there is a heuristic.
+    """
     halves = (np.float32(0.5) * table).astype(np.float32)
     side_limit = INF if cut_corners else LARGEST_FLOAT
     scale, columns = np.float32(heuristic_scale), np.uint32(stride)
@@ -110,7 +124,9 @@ def _search(
     slot = bucket & (RING - 1)
     buckets[slot, 0], counts[slot] = start, 1
     records[start].state = (records[start].state & ~SLOT_BITS) | np.uint32(slot)
-    waiting = 1
+    waiting, status = 1, EXHAUSTED
+    x_low, y_low = np.int32(start % stride), np.int32(start // stride)
+    x_high, y_high = x_low, y_low
 
     while waiting > 0:
         # 2. Go on to the next bucket that is not empty; the goal is settled once no key can be below its g.
@@ -118,10 +134,11 @@ def _search(
         if counts[slot] == 0:
             bucket += 1
             if goal >= 0 and np.float32(bucket) * width >= records[goal].g:
-                return FOUND
+                break
             continue
         if cancel_flag[0] != 0:
-            return CANCELED
+            status = CANCELED
+            break
 
         # 3. Relax all of it.
         if fresh.size < 8 * counts[slot]:
@@ -141,9 +158,10 @@ def _search(
             cell = np.uint32(fresh[i])
             key = records[cell].g
             if scale > 0.0:
-                y = cell // columns
-                x = cell - y * columns
-                key += scale * octile_distance(abs(np.int32(x) - goal_x), abs(np.int32(y) - goal_y))
+                y = np.int32(cell // columns)
+                x = np.int32(cell - np.uint32(y) * columns)
+                x_low, x_high, y_low, y_high = min(x_low, x), max(x_high, x), min(y_low, y), max(y_high, y)
+                key += scale * octile_distance(abs(x - goal_x), abs(y - goal_y))
             slot = max(int(key * inverse_width), bucket) & (RING - 1)
             buckets[slot, counts[slot]] = cell
             state = records[cell].state
@@ -151,4 +169,7 @@ def _search(
             counts[slot] += is_new
             waiting += is_new
             records[cell].state = (state & KEPT_BITS) | (np.uint32(came[i]) << CAME_SHIFT) | np.uint32(slot)
-    return FOUND if goal >= 0 and records[goal].g < INF else EXHAUSTED
+    touched[0], touched[1], touched[2], touched[3] = x_low, y_low, x_high + 1, y_high + 1
+    if status != CANCELED and goal >= 0 and records[goal].g < INF:
+        return FOUND
+    return status

@@ -28,6 +28,8 @@ from mbf_costmap_nav.kernels.search.open_list import IDLE
 CELL = np.dtype([("g", np.float32), ("state", np.uint32)])
 """A cell: cost from the start, inf where not reached, and the word of bits above."""
 Records = np.ndarray[Any, np.dtype[np.void]]
+Box = NDArray[np.int64]
+"""Half-open box (4,) of columns and rows of a padded grid: x0, y0, x1, y1."""
 
 DIRECTIONS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))
 """Steps (x, y) to the neighbours: straight ones first, then a diagonal for each pair of them."""
@@ -48,29 +50,47 @@ def new_records(count: int) -> Records:
     return np.empty(count, dtype=CELL)
 
 
-def write_records(cells: NDArray[np.uint8], stride: int, cancel_flag: NDArray[np.uint8], records: Records) -> None:
-    """Fill the records (n,) of a padded grid (n,) with rows of ``stride``, none of them reached; stop if cancelled."""
-    _fill(cells.reshape(-1, stride), records.view(np.uint64).reshape(-1, stride), cancel_flag)
+def whole_grid(cells: NDArray[np.uint8], stride: int) -> Box:
+    """The box of all cells of a padded grid."""
+    return np.array([0, 0, stride, cells.size // stride], dtype=np.int64)
+
+
+def write_records(
+    cells: NDArray[np.uint8], stride: int, cancel_flag: NDArray[np.uint8], records: Records, box: Box
+) -> None:
+    """Write the records (n,) in a box of a padded grid (n,) with rows of ``stride``, none reached, unless cancelled."""
+    _fill(cells.reshape(-1, stride), records.view(np.uint64).reshape(-1, stride), cancel_flag, box)
 
 
 @kernel
-def _fill(cells: NDArray[np.uint8], words: NDArray[np.uint64], cancel_flag: NDArray[np.uint8]) -> None:
-    """Write all records as whole words, unless cancelled; the padding is never plain."""
+def _fill(cells: NDArray[np.uint8], words: NDArray[np.uint64], cancel_flag: NDArray[np.uint8], box: Box) -> None:
+    """Write the records of a box as whole words, unless cancelled; the padding is never plain."""
     height, width = cells.shape
-    cost_shift, plain_shift = np.uint64(48), np.uint64(47)
-    for y in range(height):
+    first, last = max(box[0] - 1, 0), min(box[2] + 1, width)
+    for y in range(box[1], box[3]):
         if cancel_flag[0] != 0:
             return
-        below, here, above = cells[max(y - 1, 0)], cells[y], cells[min(y + 1, height - 1)]
-        row = words[y]
-        row[0] = _UNTOUCHED | (np.uint64(here[0]) << cost_shift)
-        row[width - 1] = _UNTOUCHED | (np.uint64(here[width - 1]) << cost_shift)
-        for x in range(1, width - 1):
-            cost = here[x]
-            plain = (here[x - 1] == cost) & (here[x + 1] == cost) & (0 < y) & (y < height - 1)
-            plain &= (below[x - 1] == cost) & (below[x] == cost) & (below[x + 1] == cost)
-            plain &= (above[x - 1] == cost) & (above[x] == cost) & (above[x + 1] == cost)
-            row[x] = _UNTOUCHED | (np.uint64(cost) << cost_shift) | (np.uint64(plain) << plain_shift)
+        below, above = cells[max(y - 1, 0), first:last], cells[min(y + 1, height - 1), first:last]
+        _fill_row(below, cells[y, first:last], above, 0 < y < height - 1, words[y, first:last])
+        for x in (0, width - 1):
+            words[y, x] = _UNTOUCHED | (np.uint64(cells[y, x]) << np.uint64(48))
+
+
+@kernel
+def _fill_row(
+    below: NDArray[np.uint8],
+    here: NDArray[np.uint8],
+    above: NDArray[np.uint8],
+    inside: bool,
+    row: NDArray[np.uint64],
+) -> None:
+    """Write the records (n,) of a row but for its ends; costs (n,) of the row and of those beside it."""
+    for x in range(1, len(here) - 1):  # from a number on, so that no index may be negative: it becomes vector code
+        cost = here[x]
+        plain = (here[x - 1] == cost) & (here[x + 1] == cost) & inside
+        plain &= (below[x - 1] == cost) & (below[x] == cost) & (below[x + 1] == cost)
+        plain &= (above[x - 1] == cost) & (above[x] == cost) & (above[x + 1] == cost)
+        row[x] = _UNTOUCHED | (np.uint64(cost) << np.uint64(48)) | (np.uint64(plain) << np.uint64(47))
 
 
 @kernel

@@ -25,15 +25,24 @@ from mbf_costmap_nav.kernels.compiled import kernel
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FIRST_CAPACITY, FOUND
 from mbf_costmap_nav.kernels.search.open_list import IDLE, RING, bucket_width, enlarged_if_full
 from mbf_costmap_nav.kernels.search.padded_grid import CELLS_PER_POLL, INF, PaddedGrid, octile_distance
-from mbf_costmap_nav.kernels.search.short_lines import (
-    CROSSED,
-    HERE,
-)
+from mbf_costmap_nav.kernels.search.search_cells import Box, whole_grid
+from mbf_costmap_nav.kernels.search.short_lines import CROSSED, HERE
 from mbf_costmap_nav.kernels.search.theta_expansion import OPENED, Labels, expand_bucket
 
 
+def new_labels(count: int) -> Labels:
+    """Memory for the labels of ``count`` cells that hold anything."""
+    # numpy's own arrays, for huge pages, as in grid_search
+    return Labels(np.empty(count, dtype=np.float32), np.empty(count, dtype=np.uint8), np.empty(count, dtype=np.uint8))
+
+
 def theta_search(
-    grid: PaddedGrid, start: int, goal: int, cancel_flag: NDArray[np.uint8]
+    grid: PaddedGrid,
+    start: int,
+    goal: int,
+    cancel_flag: NDArray[np.uint8],
+    labels: Labels | None = None,
+    touched: Box | None = None,
 ) -> tuple[int, NDArray[np.float32], NDArray[np.uint8]]:
     """Settle cells from ``start`` until ``goal`` is settled.
 
@@ -41,6 +50,8 @@ def theta_search(
     ----------
     grid, start, goal, cancel_flag
         As for ``grid_search.search``; the traversal of a free cell is 1 or more.
+    labels, touched
+        As ``records`` and ``touched`` there.
 
     Returns
     -------
@@ -51,19 +62,30 @@ def theta_search(
     origin : (n,) uint8
         Codes of where the straight line to a cell comes from, for ``trace_lines``.
     """
-    count = grid.cells.size  # numpy's own arrays, for huge pages, as in grid_search
-    labels = Labels(np.empty(count, dtype=np.float32), np.empty(count, dtype=np.uint8), np.empty(count, dtype=np.uint8))
-    for begin in range(0, count, CELLS_PER_POLL):
+    labels = new_labels(grid.cells.size) if labels is None else labels
+    whole = whole_grid(grid.cells, grid.stride)
+    touched = whole.copy() if touched is None else touched
+    x0, y0, x1, y1 = touched.tolist()
+    rows = max(1, CELLS_PER_POLL // grid.stride)
+    for begin in range(y0, y1, rows):
         if cancel_flag[0] != 0:
+            touched[:] = whole
             return CANCELED, labels.g, labels.origin
-        block = slice(begin, begin + CELLS_PER_POLL)
-        labels.g[block], labels.origin[block], labels.queued[block] = INF, HERE, IDLE
-    return _search(grid, labels, start, goal, cancel_flag), labels.g, labels.origin
+        part = slice(begin, min(begin + rows, y1)), slice(x0, x1)
+        labels.g.reshape(-1, grid.stride)[part] = INF
+        labels.origin.reshape(-1, grid.stride)[part] = HERE
+        labels.queued.reshape(-1, grid.stride)[part] = IDLE
+    return _search(grid, labels, start, goal, cancel_flag, touched), labels.g, labels.origin
 
 
 @kernel
-def _search(grid: PaddedGrid, labels: Labels, start: int, goal: int, cancel_flag: NDArray[np.uint8]) -> int:
-    """Fill ``g`` and ``origin`` of the labels, given full of inf, HERE and IDLE, and return the status."""
+def _search(
+    grid: PaddedGrid, labels: Labels, start: int, goal: int, cancel_flag: NDArray[np.uint8], touched: Box
+) -> int:
+    """Fill ``g`` and ``origin`` of the labels, given full of inf, HERE and IDLE, and return the status.
+
+    ``touched`` becomes the box of cells that were reached.
+    """
     stride, (g, _, queued) = grid.stride, labels
     columns = np.uint32(stride)
     goal_x, goal_y = goal % stride, goal // stride
@@ -79,6 +101,8 @@ def _search(grid: PaddedGrid, labels: Labels, start: int, goal: int, cancel_flag
     slot = bucket & (RING - 1)
     buckets[slot, 0], counts[slot], queued[start] = start, 1, slot
     waiting = 1
+    x_low, y_low = np.int32(start % stride), np.int32(start // stride)
+    x_high, y_high = x_low, y_low
 
     status = EXHAUSTED
     while waiting > 0:
@@ -105,21 +129,25 @@ def _search(grid: PaddedGrid, labels: Labels, start: int, goal: int, cancel_flag
         buckets = enlarged_if_full(buckets, counts, credited)
         for i in range(credited):
             cell = np.uint32(fresh[i])
+            y = np.int32(cell // columns)
+            x = np.int32(cell - np.uint32(y) * columns)
+            x_low, x_high, y_low, y_high = min(x_low, x), max(x_high, x), min(y_low, y), max(y_high, y)
             if g[cell] <= 0.0 and queued[cell] != OPENED:
                 continue
-            y = cell // columns
-            dx, dy = np.int32(cell - y * columns) - goal_x, np.int32(y) - goal_y
-            key = abs(g[cell]) + octile_distance(abs(dx), abs(dy))
+            key = abs(g[cell]) + octile_distance(abs(x - goal_x), abs(y - goal_y))
             slot = min(max(int(key * inverse_width), bucket), bucket + RING - 1) & (RING - 1)
             buckets[slot, counts[slot]] = cell
             is_new = np.int64(queued[cell] != slot)
             counts[slot] += is_new
             waiting += is_new
             queued[cell] = slot
+    touched[0], touched[1], touched[2], touched[3] = x_low, y_low, x_high + 1, y_high + 1
     if status == CANCELED:
         return status
     if g[goal] <= 0.0:
         status = FOUND
-    for i in range(np.uint64(g.size)):
-        g[i] = -g[i] if g[i] <= 0.0 else INF
+    for row in range(y_low, y_high + 1):
+        in_row = g[row * stride + x_low : row * stride + x_high + 1]
+        for i in range(len(in_row)):
+            in_row[i] = -in_row[i] if in_row[i] <= 0.0 else INF
     return status

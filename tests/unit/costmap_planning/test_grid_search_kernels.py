@@ -14,9 +14,9 @@ from mbf_costmap_nav.kernels.search.grid_line import line_cost
 from mbf_costmap_nav.kernels.search.grid_path import trace_cells, trace_gradient
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FOUND, search
 from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid, pad_cells
-from mbf_costmap_nav.kernels.search.search_cells import new_records
+from mbf_costmap_nav.kernels.search.search_cells import new_records, whole_grid
 from mbf_costmap_nav.kernels.search.short_lines import TOUCHED, crossed_cells, trace_lines
-from mbf_costmap_nav.kernels.search.theta_star import theta_search
+from mbf_costmap_nav.kernels.search.theta_star import new_labels, theta_search
 from mbf_costmap_nav.planning.search_grid import traversal_table
 
 NO_CANCEL = np.zeros(1, dtype=np.uint8)
@@ -113,6 +113,31 @@ def test_memory_that_has_been_searched_in_changes_no_later_search(first, second)
         alone = search(grid, stride + 1, -1, 0.0, False, False, NO_CANCEL)
         assert status == alone[0]
         np.testing.assert_array_equal(g, alone[1])
+
+
+@settings(max_examples=40, deadline=None)
+@given(cells=small_maps, data=st.data())
+def test_memory_that_is_cleaned_where_it_was_touched_changes_no_later_search(cells, data):
+    height, width = cells.shape
+    stride, table = width + 2, traversal_table(3.0, 253, False)
+    grid = PaddedGrid(pad_cells(cells, 254), stride, table)
+    memories = new_records(grid.cells.size), whole_grid(grid.cells, stride)
+    labels = new_labels(grid.cells.size), whole_grid(grid.cells, stride)
+    canceled = np.ones(1, dtype=np.uint8)
+    for _ in range(4):
+        place = st.tuples(st.integers(1, height), st.integers(1, width))
+        start, goal = (y * stride + x for y, x in (data.draw(place), data.draw(place)))
+        if data.draw(st.integers(0, 4)) == 0:  # also after one that was canceled
+            assert search(grid, start, goal, 1.0, False, False, canceled, *memories)[0] == CANCELED
+            assert theta_search(grid, start, goal, canceled, *labels)[0] == CANCELED
+        scale = float(data.draw(st.integers(0, 1)))
+        ours, alone = (search(grid, start, goal, scale, False, False, NO_CANCEL, *own) for own in (memories, ()))
+        assert ours[0] == alone[0]
+        np.testing.assert_array_equal(ours[1], alone[1])
+        ours, alone = (theta_search(grid, start, goal, NO_CANCEL, *own) for own in (labels, ()))
+        assert ours[0] == alone[0]
+        for mine, other in zip(ours[1:], alone[1:], strict=True):
+            np.testing.assert_array_equal(mine, other)
 
 
 def test_a_field_may_end_at_a_cell_that_has_its_final_value():

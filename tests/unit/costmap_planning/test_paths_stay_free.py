@@ -108,5 +108,5 @@ def test_a_set_flag_ends_the_preparation_of_a_search_before_its_first_row():
     assert not np.array_equal(pad_cells(cells, 254, flag).reshape(3002, 402)[1:-1, 1:-1], cells)
     assert np.array_equal(pad_cells(cells, 254).reshape(3002, 402)[1:-1, 1:-1], cells)
     words = np.zeros(cells.shape, dtype=np.uint64)
-    _fill(cells, words, flag)
+    _fill(cells, words, flag, np.array([0, 0, cells.shape[1], cells.shape[0]]))
     assert not words.any()
