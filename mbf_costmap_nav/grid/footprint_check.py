@@ -13,12 +13,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry.arithmetic import plane_rotation, rotated
 from mbf_abstract.geometry.polygon import inside_polygon
 from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.kernels.map.footprint_cost import collisions, first_collision, footprint_cost
+from mbf_costmap_nav.kernels.map.footprint_cost import collisions, first_collision, first_lethal, footprint_cost
 
 FloatArray = NDArray[np.float64]
 
@@ -58,11 +57,9 @@ class FootprintCheck:
 
     def touched(self, costmap: Costmap, x: float, y: float, yaw: float) -> tuple[float, float] | None:
         """Centre (x, y) [m] of a lethal cell under the footprint; None if there is none."""
-        points = np.asarray(rotated(plane_rotation(yaw), self.samples) + np.array([x, y]))
-        cells, inside = costmap.world_to_cells(points)
-        cells = cells[inside]
-        lethal = cells[costmap.cells[cells[:, 1], cells[:, 0]] == LETHAL]
-        return costmap.cell_to_world(*lethal[0].tolist()) if len(lethal) else None
+        grid = costmap.cells, costmap.resolution, costmap.origin_x, costmap.origin_y
+        ix, iy = first_lethal(*grid, self.samples, x, y, math.cos(yaw), math.sin(yaw))
+        return None if ix < 0 else costmap.cell_to_world(int(ix), int(iy))
 
     def first_collision(self, costmap: Costmap, poses: FloatArray) -> int:
         """Index of the first colliding pose of (n, 3) poses (x, y, yaw), or -1."""

@@ -20,12 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.arithmetic import arctan2, norm
+from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import CellBox, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.kernels.map.path_poses import headed_poses
 from mbf_costmap_nav.planning.outline_course import Course, stretches
 
 if TYPE_CHECKING:
@@ -156,9 +157,7 @@ class Manoeuvres:
 
         A path over cells goes in steps of 45 degrees; the robot looks along it on the average.
         """
-        steps = np.diff(points, axis=0, append=points[-1:])
-        poses = np.column_stack([points, arctan2(steps[:, 1], steps[:, 0])])
-        wrong = self._check.collisions(self.costmap, poses) & np.isnan(yaws)
+        wrong = self._check.collisions(self.costmap, headed_poses(np.ascontiguousarray(points))) & np.isnan(yaws)
         wrong[[0, -1]] = False
         if not wrong.any():
             return Fitted(points, yaws)

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import normalize_angle
-from mbf_abstract.geometry.arithmetic import arctan2
 from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.kernels.map.path_poses import course_along
 
 FloatArray = NDArray[np.float64]
 
@@ -49,16 +49,10 @@ class Course:
     @classmethod
     def along(cls, points: FloatArray, spacing: float, start_yaw: float | None, end_yaw: float | None) -> Course:
         """Course on a path of points (k, 2), with poses at most ``spacing`` [m] apart."""
-        given = polyline_lengths(points)
-        lengths = _filled(given, spacing)
-        before, places, behind = (
-            np.column_stack([np.interp(lengths + side, given, axis) for axis in points.T]) for side in (-ARM, 0.0, ARM)
-        )
-        steps = behind - before
-        yaws = arctan2(steps[:, 1], steps[:, 0])
+        poses, lengths = course_along(np.ascontiguousarray(points), spacing, ARM)
         if lengths[-1] == 0.0:  # the robot stays where it is: it only turns
-            yaws[:] = start_yaw if start_yaw is not None else end_yaw or 0.0
-        return cls(np.column_stack([places, yaws]), lengths, start_yaw, end_yaw)
+            poses[:, 2] = start_yaw if start_yaw is not None else end_yaw or 0.0
+        return cls(poses, lengths, start_yaw, end_yaw)
 
     def misfits(self, check: FootprintCheck, costmap: Costmap) -> NDArray[np.bool_]:
         """(n,) bool: where the outline touches a lethal cell; at the ends also while the robot turns."""
@@ -95,15 +89,6 @@ class Course:
             return np.zeros((0, 3))
         step = 0.5 * costmap.resolution / max(check.footprint.circumscribed_radius, costmap.resolution)
         return turn_poses(self.poses[index], yaw, step)
-
-
-def _filled(lengths: FloatArray, spacing: float) -> FloatArray:
-    """Lengths (m,) [m] along a path: those given (k,), and between them more, at most ``spacing`` apart."""
-    steps = np.diff(lengths)
-    counts = np.maximum(1, np.ceil(steps / spacing - 1e-9)).astype(np.int64)
-    inner = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    filled = np.repeat(lengths[:-1], counts) + np.repeat(steps / counts, counts) * inner
-    return np.append(filled, lengths[-1])
 
 
 def turn_poses(pose: FloatArray, yaw: float, step: float) -> FloatArray:

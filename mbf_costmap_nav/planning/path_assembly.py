@@ -7,11 +7,15 @@ import numpy as np
 from mbf_abstract.geometry import FloatArray, Path, Pose, quaternion_from_yaw
 from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_abstract.plugins import PlanRequest
+from mbf_costmap_nav.kernels.map.path_poses import level_path
 from mbf_costmap_nav.planning.manoeuvres import Fitted
 from mbf_costmap_nav.planning.search_grid import SearchGrid
 
 NEAR_END = 0.75
 """Points this near [cells] to an exact start or goal are dropped: going there first would be a step back."""
+
+FIRST = 8
+"""So many points are looked at at a time for the first that is far enough."""
 
 
 def with_exact_ends(grid: SearchGrid, points: FloatArray, start: Pose, goal: Pose | None) -> FloatArray:
@@ -27,9 +31,17 @@ def _from_exactly(grid: SearchGrid, exact: FloatArray, points: FloatArray) -> Fl
     """
     if len(points) == 1:
         return np.stack([exact, points[0]])
-    far = np.hypot(*(points[1:-1] - exact).T) > NEAR_END * grid.costmap.resolution
-    rest = points[1 + (int(np.argmax(far)) if far.any() else len(far)) :]
+    rest = points[1 + _near(points[1:-1], exact, NEAR_END * grid.costmap.resolution) :]
     return np.vstack([exact, rest if grid.is_free_line(exact, rest[0]) else points])
+
+
+def _near(points: FloatArray, exact: FloatArray, distance: float) -> int:
+    """How many of the first points (n, 2) are at most a distance [m] from a point; mostly only few are looked at."""
+    for begin in range(0, len(points), FIRST):
+        far = np.hypot(*(points[begin : begin + FIRST] - exact).T) > distance
+        if far.any():
+            return begin + int(np.argmax(far))
+    return len(points)
 
 
 def heights_along(points: FloatArray, request: PlanRequest) -> FloatArray:
@@ -43,10 +55,8 @@ def assembled(pieces: list[Fitted], request: PlanRequest, goal: Pose, frame_id: 
     """Join the legs; poses head along the path or as the manoeuvres do, the first and the last one as requested."""
     points = np.concatenate([pieces[0].points, *(piece.points[1:] for piece in pieces[1:])])
     yaws = np.concatenate([pieces[0].yaws, *(piece.yaws[1:] for piece in pieces[1:])])
-    path = Path.from_points(np.column_stack([points, heights_along(points, request)]), goal.orientation)
-    assert path.orientations is not None
-    orientations = path.orientations.copy()
+    positions, orientations = level_path(np.ascontiguousarray(points), request.start.z, request.goal.z)
     for index in np.flatnonzero(~np.isnan(yaws[:-1])).tolist():
         orientations[index] = quaternion_from_yaw(yaws[index])
-    orientations[0] = request.start.orientation
-    return Path(path.positions, orientations, frame_id, stamp)
+    orientations[-1], orientations[0] = goal.orientation, request.start.orientation
+    return Path(positions, orientations, frame_id, stamp)

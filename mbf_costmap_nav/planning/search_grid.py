@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -140,10 +141,19 @@ class SearchGrid:
 
     def is_free_line(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether the line between two points (x, y) [m] runs through no blocked cell and does not leave the map."""
-        (x0, y0), (x1, y1) = ((np.asarray(p) - self.geometry[1:]) / self.costmap.resolution for p in (a, b))
+        grid = self.costmap
+        ends = [
+            (value - origin) / grid.resolution
+            for point in (a, b)
+            for value, origin in zip(np.asarray(point).tolist(), (grid.origin_x, grid.origin_y), strict=True)
+        ]
         unknown = LETHAL if math.isinf(self.padded.table[UNKNOWN]) else 0
-        first_blocked = int(np.argmax(np.isinf(self.padded.table[:UNKNOWN])))
-        return int(cost_along(self.costmap.cells, unknown, x0, y0, x1, y1)) < first_blocked
+        return int(cost_along(grid.cells, unknown, *ends)) < self._first_blocked
+
+    @cached_property
+    def _first_blocked(self) -> int:
+        """Least cost that blocks."""
+        return int(np.argmax(np.isinf(self.padded.table[:UNKNOWN])))
 
     def nearest_reached(
         self, g: NDArray[np.float32], goal: Pose, tolerance: float, samples: NDArray[np.float64] = NO_ROBOT

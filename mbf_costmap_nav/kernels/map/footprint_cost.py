@@ -64,6 +64,28 @@ def footprint_cost(
 
 
 @kernel
+def first_lethal(
+    cells: NDArray[np.uint8],
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    samples: NDArray[np.float64],
+    x: float,
+    y: float,
+    cosine: float,
+    sine: float,
+) -> tuple[int, int]:
+    """The lethal cell (ix, iy) under the first sample of the footprint that lies on one; (-1, -1) if none does."""
+    height, width = cells.shape
+    for i in range(samples.shape[0]):
+        ix = int(np.floor((cosine * samples[i, 0] - sine * samples[i, 1] + x - origin_x) / resolution))
+        iy = int(np.floor((sine * samples[i, 0] + cosine * samples[i, 1] + y - origin_y) / resolution))
+        if 0 <= ix < width and 0 <= iy < height and cells[iy, ix] == 254:
+            return ix, iy
+    return -1, -1
+
+
+@kernel
 def first_collision(
     cells: NDArray[np.uint8],
     resolution: float,

@@ -1,0 +1,87 @@
+"""Poses along a path from the kernels are, bit for bit, those of the numpy formulas."""
+
+import numpy as np
+import pytest
+
+from mbf_abstract.geometry import Path
+from mbf_abstract.geometry.arithmetic import arctan2, plane_rotation, rotated
+from mbf_abstract.geometry.polyline import polyline_lengths
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.kernels.map.path_poses import course_along, headed_poses, level_path
+
+
+def paths():
+    """Random paths (k, 2) [m]: along cells, from place to place, with repeated points, of one point."""
+    rng = np.random.default_rng(6)
+    for count in (1, 2, 3, 7, 60, 700):
+        for _ in range(12):
+            yield rng.uniform(-20.0, 20.0, (count, 2))
+            cells = np.cumsum(rng.integers(-1, 2, (count, 2)), axis=0)  # stays where it is, now and then
+            yield 0.05 * (cells + 0.5) - 3.0
+            yield np.repeat(rng.uniform(-1.0, 1.0, (count, 2)), 2, axis=0)
+    yield np.zeros((4, 2))
+
+
+def course_by_numpy(points, spacing, arm):
+    given = polyline_lengths(points)
+    steps = np.diff(given)
+    counts = np.maximum(1, np.ceil(steps / spacing - 1e-9)).astype(np.int64)
+    inner = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    filled = np.repeat(given[:-1], counts) + np.repeat(steps / counts, counts) * inner
+    lengths = np.append(filled, given[-1])
+    before, places, behind = (
+        np.column_stack([np.interp(lengths + side, given, axis) for axis in points.T]) for side in (-arm, 0.0, arm)
+    )
+    toward = behind - before
+    return np.column_stack([places, arctan2(toward[:, 1], toward[:, 0])]), lengths
+
+
+def same_bytes(ours, expected):
+    assert ours.shape == expected.shape and ours.dtype == expected.dtype
+    assert ours.tobytes() == np.ascontiguousarray(expected).tobytes()
+
+
+@pytest.mark.parametrize("spacing", [0.05, 0.3])
+def test_the_course_along_a_path_has_the_bytes_of_numpy(spacing):
+    for points in paths():
+        for ours, expected in zip(
+            course_along(points, spacing, 0.2), course_by_numpy(points, spacing, 0.2), strict=True
+        ):
+            same_bytes(ours, expected)
+
+
+def test_poses_that_look_to_the_next_point_have_the_bytes_of_numpy():
+    for points in paths():
+        steps = np.diff(points, axis=0, append=points[-1:])
+        same_bytes(headed_poses(points), np.column_stack([points, arctan2(steps[:, 1], steps[:, 0])]))
+
+
+@pytest.mark.parametrize("heights", [(0.0, 0.0), (1.0, -0.5), (-0.0, 0.0), (-2.0, -2.0)])
+def test_a_level_path_has_the_bytes_of_numpy(heights):
+    for points in paths():
+        along = polyline_lengths(points)
+        share = along / along[-1] if along[-1] > 0.0 else along
+        z = heights[0] + share * (heights[1] - heights[0])
+        expected = Path.from_points(np.column_stack([points, z]))
+        positions, orientations = level_path(points, *heights)
+        same_bytes(positions, expected.positions)
+        same_bytes(orientations, expected.orientations)
+
+
+def test_the_first_lethal_cell_under_a_footprint_is_that_of_numpy():
+    rng = np.random.default_rng(8)
+    check = FootprintCheck(Footprint([[-0.5, -0.25], [0.5, -0.25], [0.6, 0.25]]), 0.05)
+    found = 0
+    for _ in range(400):
+        costmap = Costmap(np.where(rng.random((40, 50)) < 0.02, 254, 0).astype(np.uint8), 0.05, -1.0, 0.3)
+        x, y, yaw = rng.uniform((-1.5, 0.0, -4.0), (2.0, 2.5, 4.0)).tolist()
+        points = rotated(plane_rotation(yaw), check.samples) + np.array([x, y])
+        cells, inside = costmap.world_to_cells(points)
+        cells = cells[inside]
+        lethal = cells[costmap.cells[cells[:, 1], cells[:, 0]] == 254]
+        expected = costmap.cell_to_world(*lethal[0].tolist()) if len(lethal) else None
+        assert check.touched(costmap, x, y, yaw) == expected
+        found += expected is not None
+    assert 100 < found < 390
