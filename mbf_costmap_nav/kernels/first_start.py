@@ -11,15 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from mbf_costmap_nav.kernels.map.footprint_cost import collisions, first_collision
+from mbf_costmap_nav.kernels.map.footprint_cost import first_collision, first_lethal
 from mbf_costmap_nav.kernels.map.inflation import _column_distances, _spread_rows
 from mbf_costmap_nav.kernels.map.line_cells import cost_along
+from mbf_costmap_nav.kernels.map.outline_along import fits_along
+from mbf_costmap_nav.kernels.map.path_poses import level_path
 from mbf_costmap_nav.kernels.map.rasterisation import fill_polygon
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays, mark_points
 from mbf_costmap_nav.kernels.search.grid_path import trace_cells
-from mbf_costmap_nav.kernels.search.grid_search import _search
+from mbf_costmap_nav.kernels.search.grid_search import _write_and_search
 from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid
-from mbf_costmap_nav.kernels.search.search_cells import _fill, new_records
+from mbf_costmap_nav.kernels.search.search_cells import new_records
 
 
 def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
@@ -32,11 +34,15 @@ def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
     return [
         (_column_distances, (cells, 0, 0, cells, cost)),
         (_spread_rows, (cells, (0, 0, 0, 0), cells, 0, 0, 0, row, cost)),
-        (_fill, (cells, _example(np.uint64, 2), row, box)),
-        (_search, (records, 0, table, 0, 0, 0.0, True, True, row, buckets, box)),
+        (first_lethal, (costs, 0.0, 0.0, 0.0, points, 0.0, 0.0, 0.0, 0.0)),
+        (
+            _write_and_search,
+            (cells, _example(np.uint64, 2), records, table, 0, 0, 0.0, True, True, row, buckets, box),
+        ),
         (trace_cells, (PaddedGrid(row, 0, table), records["g"], 0, True)),
         (cost_along, (costs, 0, 0.0, 0.0, 0.0, 0.0)),
-        (collisions, (costs, 0.0, 0.0, 0.0, points, points)),
+        (fits_along, (costs, 0.0, 0.0, 0.0, points, points, 0.0, 0.0, 0.0, 0.0)),
+        (level_path, (points, 0.0, 0.0)),
         (first_collision, (costs, 0.0, 0.0, 0.0, points, points)),
         (fill_polygon, (cells, points, 0)),
         (clear_rays, (cells, reals, 0.0, reals, points, 0.0, 0.0, 0, box)),

@@ -21,8 +21,7 @@ from typing import ClassVar
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_costmap_nav.kernels.search.grid_path import trace_cells
-from mbf_costmap_nav.kernels.search.grid_search import CANCELED, search
-from mbf_costmap_nav.kernels.search.search_cells import new_records
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, new_search_memory, search
 from mbf_costmap_nav.planning.grid_planning import NO_LEG, GridPlanner, Leg
 from mbf_costmap_nav.planning.potential_planning import plan_down_potential
 from mbf_costmap_nav.planning.search_grid import GridPlannerParameters, SearchGrid
@@ -47,7 +46,8 @@ class AStarPlanner(GridPlanner):
             return plan_down_potential(grid, start, goal, tolerance, interpolated=True)
         cut, goal_cell = self.parameters.cut_corners, grid.cell_of(goal)
         first, last, flag = grid.index(grid.cell_of(start)), grid.index(goal_cell), grid.token.flag
-        status, g = search(grid.padded, first, last, 1.0, cut, False, flag, *grid.memory(new_records))
+        (records, buckets), touched = grid.memory(new_search_memory)
+        status, g = search(grid.padded, first, last, 1.0, cut, False, flag, records, touched, buckets)
         if status == CANCELED:
             return NO_LEG
         end = goal_cell if g[last] < float("inf") else grid.nearest_reached(g, goal, tolerance)

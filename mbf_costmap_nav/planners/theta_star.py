@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_costmap_nav.kernels.search.grid_line import line_cost, pull_string
+from mbf_costmap_nav.kernels.search.grid_line import lines_cost, pull_string
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND
 from mbf_costmap_nav.kernels.search.short_lines import trace_lines
 from mbf_costmap_nav.kernels.search.theta_star import new_labels, theta_search
@@ -63,6 +63,4 @@ class ThetaStarPlanner(GridPlanner):
 
 def path_cost(grid: SearchGrid, corners: NDArray[np.int32]) -> float:
     """Cost [m, weighted] of straight lines between flat padded indices."""
-    pieces = zip(corners[:-1].tolist(), corners[1:].tolist(), strict=True)
-    total = sum(float(line_cost(grid.padded, a, b)) for a, b in pieces)
-    return total * grid.costmap.resolution
+    return float(lines_cost(grid.padded, corners)) * grid.costmap.resolution

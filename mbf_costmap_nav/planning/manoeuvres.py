@@ -26,8 +26,9 @@ from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import CellBox, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.kernels.map.outline_along import fits_along
 from mbf_costmap_nav.kernels.map.path_poses import headed_poses
-from mbf_costmap_nav.planning.outline_course import Course, stretches
+from mbf_costmap_nav.planning.outline_course import ARM, Course, stretches, turn_step
 
 if TYPE_CHECKING:
     from mbf_costmap_nav.planning.car_search import Driving
@@ -122,6 +123,8 @@ class Manoeuvres:
         spare : float
             How much [m] of the path's end may be left out where the robot does not fit at it.
         """
+        if self._fits(points, start_yaw, end_yaw):
+            return Fitted(points, np.full(len(points), np.nan))
         course = self._course(points, start_yaw, end_yaw)
         wrong = course.misfits(self._check, self.costmap)
         if wrong[-1] and spare > 0.0:
@@ -144,6 +147,14 @@ class Manoeuvres:
         index = int(np.argmax(wrong))
         at_end = index == len(wrong) - 1
         return Misfit(course.colliding_pose(index, self._check, self.costmap), index == 0 and not at_end, at_end)
+
+    def _fits(self, points: FloatArray, start_yaw: float | None, end_yaw: float | None) -> bool:
+        """Whether there is nothing to replace, all in one: so it mostly is."""
+        grid = self.costmap.cells, self.costmap.resolution, self.costmap.origin_x, self.costmap.origin_y
+        turns = (start_yaw, end_yaw) if self.min_turning_radius == 0.0 else (None, None)
+        yaws = [math.nan if yaw is None else float(yaw) for yaw in turns]
+        step = turn_step(self._check, self.costmap)
+        return bool(fits_along(*grid, self._check.samples, np.ascontiguousarray(points), ARM, step, *yaws))
 
     def _course(self, points: FloatArray, start_yaw: float | None, end_yaw: float | None) -> Course:
         """Course on a path; a car does not turn where it stands."""

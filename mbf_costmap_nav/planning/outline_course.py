@@ -87,8 +87,12 @@ class Course:
         yaw = self.start_yaw if index == 0 else self.end_yaw if index in (-1, len(self.poses) - 1) else None
         if yaw is None:
             return np.zeros((0, 3))
-        step = 0.5 * costmap.resolution / max(check.footprint.circumscribed_radius, costmap.resolution)
-        return turn_poses(self.poses[index], yaw, step)
+        return turn_poses(self.poses[index], yaw, turn_step(check, costmap))
+
+
+def turn_step(check: FootprintCheck, costmap: Costmap) -> float:
+    """Angle [rad] by which no corner of the outline goes farther than half a cell."""
+    return 0.5 * costmap.resolution / max(check.footprint.circumscribed_radius, costmap.resolution)
 
 
 def turn_poses(pose: FloatArray, yaw: float, step: float) -> FloatArray:

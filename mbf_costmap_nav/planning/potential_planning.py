@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.kernels.search.grid_path import trace_cells, trace_gradient
-from mbf_costmap_nav.kernels.search.grid_search import CANCELED, search
-from mbf_costmap_nav.kernels.search.search_cells import new_records
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, new_search_memory, search
 from mbf_costmap_nav.planning.grid_planning import NO_LEG, Leg
 from mbf_costmap_nav.planning.search_grid import Cell, SearchGrid
 
@@ -58,5 +57,6 @@ def _from_nearest_end(
 def _propagate(grid: SearchGrid, source: Cell, until: int, interpolated: bool) -> NDArray[np.float32] | None:
     """Field from ``source`` up to the padded index ``until``, or everywhere for -1; None when cancelled."""
     first, flag = grid.index(source), grid.token.flag
-    status, g = search(grid.padded, first, until, 0.0, False, interpolated, flag, *grid.memory(new_records))
+    (records, buckets), touched = grid.memory(new_search_memory)
+    status, g = search(grid.padded, first, until, 0.0, False, interpolated, flag, records, touched, buckets)
     return None if status == CANCELED else g

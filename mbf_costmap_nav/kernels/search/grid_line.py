@@ -56,6 +56,15 @@ def line_cost(grid: PaddedGrid, a: int, b: int) -> np.float32:
 
 
 @kernel
+def lines_cost(grid: PaddedGrid, corners: NDArray[np.int32]) -> float:
+    """Sum of the costs of the straight lines between flat padded indices (n,), from the first on."""
+    total = 0.0
+    for i in range(len(corners) - 1):
+        total += float(line_cost(grid, Count(corners[i]), Count(corners[i + 1])))
+    return total
+
+
+@kernel
 def pull_string(grid: PaddedGrid, path: NDArray[np.int32]) -> NDArray[np.int32]:
     """Drop every point of a path (n,) of flat padded indices whose neighbours see each other at no higher cost.
 

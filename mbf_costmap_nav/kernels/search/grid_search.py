@@ -24,7 +24,7 @@ from mbf_costmap_nav.kernels.search.search_cells import (
     natural_steps,
     new_records,
     whole_grid,
-    write_records,
+    write_box,
 )
 
 FOUND, EXHAUSTED, CANCELED = 0, 1, 2
@@ -45,6 +45,7 @@ def search(
     cancel_flag: NDArray[np.uint8],
     records: Records | None = None,
     touched: Box | None = None,
+    buckets: NDArray[np.int32] | None = None,
 ) -> tuple[int, NDArray[np.float32]]:
     """Settle cells around ``start`` until ``goal`` is settled, or everything reachable if it cannot be reached.
 
@@ -67,6 +68,8 @@ def search(
     touched : (4,) int64, optional
         The box of records that an earlier search of this very grid has changed, so that only they are written anew;
         replaced with that of this search. All are written without it.
+    buckets : (RING, m) int32, optional
+        Memory for the open list, see ``new_buckets``.
 
     Returns
     -------
@@ -79,15 +82,57 @@ def search(
     records = new_records(grid.cells.size) if records is None else records
     whole = whole_grid(grid.cells, grid.stride)
     touched = whole.copy() if touched is None else touched
-    write_records(grid.cells, grid.stride, cancel_flag, records, touched)
-    buckets = np.empty((RING, max(FIRST_CAPACITY, grid.cells.size // CELLS_PER_ENTRY)), dtype=np.int32)
-    stride, table = grid.stride, grid.table
-    status = _search(
-        records, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, buckets, touched
+    buckets = new_buckets(grid.cells.size) if buckets is None else buckets
+    status = _write_and_search(
+        grid.cells.reshape(-1, grid.stride),
+        records.view(np.uint64).reshape(-1, grid.stride),
+        records,
+        grid.table,
+        start,
+        goal,
+        heuristic_scale,
+        cut_corners,
+        interpolated,
+        cancel_flag,
+        buckets,
+        touched,
     )
     if heuristic_scale == 0.0 or cancel_flag[0] != 0:  # set while the records were written, it left some of them out
         touched[:] = whole
     return status, records["g"]
+
+
+def new_buckets(count: int) -> NDArray[np.int32]:
+    """Memory for the open list of a search over ``count`` cells."""
+    return np.empty((RING, max(FIRST_CAPACITY, count // CELLS_PER_ENTRY)), dtype=np.int32)
+
+
+def new_search_memory(count: int) -> tuple[Records, NDArray[np.int32]]:
+    """Records and buckets for searches over ``count`` cells."""
+    return new_records(count), new_buckets(count)
+
+
+@kernel
+def _write_and_search(
+    cells: NDArray[np.uint8],
+    words: NDArray[np.uint64],
+    records: Records,
+    table: NDArray[np.float32],
+    start: int,
+    goal: int,
+    heuristic_scale: float,
+    cut_corners: bool,
+    interpolated: bool,
+    cancel_flag: NDArray[np.uint8],
+    buckets: NDArray[np.int32],
+    touched: Box,
+) -> int:
+    """Write the records of the touched box, which ``words`` are, too, and search; all in one, see ``_search``."""
+    write_box(cells, words, cancel_flag, touched)
+    stride = cells.shape[1]
+    return _search(
+        records, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, buckets, touched
+    )
 
 
 @kernel

@@ -55,29 +55,25 @@ def whole_grid(cells: NDArray[np.uint8], stride: int) -> Box:
     return np.array([0, 0, stride, cells.size // stride], dtype=np.int64)
 
 
-def write_records(
-    cells: NDArray[np.uint8], stride: int, cancel_flag: NDArray[np.uint8], records: Records, box: Box
-) -> None:
-    """Write the records (n,) in a box of a padded grid (n,) with rows of ``stride``, none reached, unless cancelled."""
-    _fill(cells.reshape(-1, stride), records.view(np.uint64).reshape(-1, stride), cancel_flag, box)
-
-
 @kernel
-def _fill(cells: NDArray[np.uint8], words: NDArray[np.uint64], cancel_flag: NDArray[np.uint8], box: Box) -> None:
-    """Write the records of a box as whole words, unless cancelled; the padding is never plain."""
+def write_box(cells: NDArray[np.uint8], words: NDArray[np.uint64], cancel_flag: NDArray[np.uint8], box: Box) -> None:
+    """Write the records of a box of a padded grid as whole words, none reached; the padding is never plain.
+
+    Cancelled, it leaves out what it has not come to.
+    """
     height, width = cells.shape
     first, last = max(box[0] - 1, 0), min(box[2] + 1, width)
     for y in range(box[1], box[3]):
         if cancel_flag[0] != 0:
             return
         below, above = cells[max(y - 1, 0), first:last], cells[min(y + 1, height - 1), first:last]
-        _fill_row(below, cells[y, first:last], above, 0 < y < height - 1, words[y, first:last])
+        _write_row(below, cells[y, first:last], above, 0 < y < height - 1, words[y, first:last])
         for x in (0, width - 1):
             words[y, x] = _UNTOUCHED | (np.uint64(cells[y, x]) << np.uint64(48))
 
 
 @kernel
-def _fill_row(
+def _write_row(
     below: NDArray[np.uint8],
     here: NDArray[np.uint8],
     above: NDArray[np.uint8],

@@ -6,10 +6,13 @@ import pytest
 from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.arithmetic import arctan2, plane_rotation, rotated
 from mbf_abstract.geometry.polyline import polyline_lengths
+from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.kernels.map.path_poses import course_along, headed_poses, level_path
+from mbf_costmap_nav.planning.manoeuvres import Manoeuvres
+from mbf_costmap_nav.planning.outline_course import Course
 
 
 def paths():
@@ -85,3 +88,20 @@ def test_the_first_lethal_cell_under_a_footprint_is_that_of_numpy():
         assert check.touched(costmap, x, y, yaw) == expected
         found += expected is not None
     assert 100 < found < 390
+
+
+def test_an_outline_fits_along_where_course_turns_and_headings_say_so():
+    rng, answers = np.random.default_rng(9), []
+    outline = Footprint([[-0.3, -0.2], [0.4, -0.2], [0.4, 0.2], [-0.3, 0.2]])
+    check = FootprintCheck(outline, 0.05)
+    for _ in range(600):
+        costmap = Costmap(np.where(rng.random((120, 120)) < 1.5e-3, 254, 0).astype(np.uint8), 0.05)
+        points = 0.05 * (np.cumsum(rng.integers(-1, 2, (int(rng.integers(1, 60)), 2)), axis=0) + 60.5)
+        start, end = (float(yaw) if rng.random() < 0.7 else None for yaw in rng.uniform(-4.0, 4.0, 2))
+        course = Course.along(points, costmap.resolution, start, end)
+        headed = check.collisions(costmap, headed_poses(points))[1:-1]
+        expected = not (course.misfits(check, costmap).any() or headed.any() or course.lengths[-1] == 0.0)
+        manoeuvres = Manoeuvres(costmap, outline, 0.0, 3.0, True, 100, CancelToken())
+        assert manoeuvres._fits(points, start, end) == expected
+        answers.append(expected)
+    assert 0.2 < np.mean(answers) < 0.8

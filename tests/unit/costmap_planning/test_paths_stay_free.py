@@ -13,7 +13,7 @@ from mbf_abstract.plugins import PlanRequest
 from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.kernels.search.padded_grid import pad_cells
-from mbf_costmap_nav.kernels.search.search_cells import _fill
+from mbf_costmap_nav.kernels.search.search_cells import write_box
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
@@ -108,5 +108,5 @@ def test_a_set_flag_ends_the_preparation_of_a_search_before_its_first_row():
     assert not np.array_equal(pad_cells(cells, 254, flag).reshape(3002, 402)[1:-1, 1:-1], cells)
     assert np.array_equal(pad_cells(cells, 254).reshape(3002, 402)[1:-1, 1:-1], cells)
     words = np.zeros(cells.shape, dtype=np.uint64)
-    _fill(cells, words, flag, np.array([0, 0, cells.shape[1], cells.shape[0]]))
+    write_box(cells, words, flag, np.array([0, 0, cells.shape[1], cells.shape[0]]))
     assert not words.any()
