@@ -19,18 +19,22 @@ import os
 import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from itertools import count
 
 from mbf_abstract.event_values import error_text
 from mbf_abstract.execution.plan_check import in_global_frame, path_result
 from mbf_abstract.execution.plugin_answer import PluginFault, checked_answer
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.result_types import GetPathResult
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginKind
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.time.cancel import CancelToken
+
+Pair = tuple[Pose, Pose]
 
 
 class BatchPlanner:
@@ -86,68 +90,97 @@ class BatchPlanner:
         dist_tolerance, angle_tolerance : float, optional
             How far [m], [rad] from its goal a path may end; the server's parameters if not given.
         cancel_token : CancelToken, optional
-            Once it is set, the pairs that are left end with CANCELED.
+            Once it is set, the pairs that are left end with CANCELED, and those being planned if their planner looks.
 
         Returns
         -------
         list of n GetPathResult
-            In the order of the pairs. What a planner raises is the INTERNAL_ERROR of its pair.
+            In the order of the pairs. What goes wrong with one pair is its own outcome: TF_ERROR where a pose cannot be
+            transformed to the global frame, INTERNAL_ERROR with what a planner, or the map, raises.
 
         Raises
         ------
         ServerError
             Another thread is in this method.
+        TypeError
+            A start or goal is no pose.
         ValueError
             Not as many starts as goals, or a tolerance is negative.
-        TransformError
-            A pose cannot be transformed to the global frame.
         """
-        if len(starts) != len(goals):
-            raise ValueError(f"as many starts as goals are needed, got {len(starts)} and {len(goals)}")
-        parameters, runtime = self._server.runtime.parameters, self._server.runtime
+        pairs, parameters = _checked_pairs(starts, goals), self._server.runtime.parameters
         distance = parameters.dist_tolerance if dist_tolerance is None else dist_tolerance
         angle = parameters.angle_tolerance if angle_tolerance is None else angle_tolerance
         if not (distance >= 0.0 and angle >= 0.0):  # not a number is no tolerance either
             raise ValueError(f"tolerances must not be negative, got {distance} m and {angle} rad")
         token = cancel_token or CancelToken()
-        requests = [
-            PlanRequest(
-                in_global_frame(start, runtime), in_global_frame(goal, runtime), distance, angle, cancel_token=token
-            )
-            for start, goal in zip(starts, goals, strict=True)
-        ]
         if not self._busy.acquire(blocking=False):
             raise ServerError("this batch planner is in use by another thread; make one for each")
         try:
-            return self._plan(requests, token) if requests else []
+            return self._plan(pairs, _PairPlan(self._server, distance, angle, token)) if pairs else []
         finally:
             self._busy.release()
 
-    def _plan(self, requests: list[PlanRequest], token: CancelToken) -> list[GetPathResult]:
-        """Hand the requests out to the threads, one by one."""
+    def _plan(self, pairs: list[Pair], plan: _PairPlan) -> list[GetPathResult]:
+        """Hand the pairs out to the threads, one by one."""
         results: dict[int, GetPathResult] = {}
         numbers = count()  # its next() is atomic
 
         def indices() -> Iterator[int]:
-            while (index := next(numbers)) < len(requests):
+            while (index := next(numbers)) < len(pairs):
                 yield index
 
         def work(planner: AbstractPlanner) -> None:
             for index in indices():
-                missing = self._server.missing_floor()
-                no_map = PlanResult(GetPathOutcome.MAP_ERROR, missing, permanent=True)
-                answer = no_map if missing else _ask(planner, requests[index])
-                results[index] = path_result(answer, requests[index], self._server.runtime, planner.name)
+                results[index] = plan.result(planner, pairs[index])
 
-        planners = self._planners[: len(requests)]
+        planners = self._planners[: len(pairs)]
         with self._server.using_map(PluginKind.PLANNER), ThreadPoolExecutor(len(planners), "plan_many") as pool:
             try:
                 for done in [pool.submit(work, planner) for planner in planners]:
                     done.result()
             except BaseException:  # a Ctrl-C: the pool waits for its threads
-                token.cancel("interrupted")
+                plan.token.cancel("interrupted")
                 raise
-        return [results[index] for index in range(len(requests))]
+        return [results[index] for index in range(len(pairs))]
+
+
+def _checked_pairs(starts: Sequence[Pose], goals: Sequence[Pose]) -> list[Pair]:
+    if len(starts) != len(goals):
+        raise ValueError(f"as many starts as goals are needed, got {len(starts)} and {len(goals)}")
+    for name, poses in (("starts", starts), ("goals", goals)):
+        for index, pose in enumerate(poses):
+            if not isinstance(pose, Pose):
+                raise TypeError(f"{name}[{index}] must be a Pose, got {type(pose).__name__}")
+    return list(zip(starts, goals, strict=True))
+
+
+@dataclass(frozen=True)
+class _PairPlan:
+    """What the plans of all pairs have in common."""
+
+    server: AbstractNavigationServer
+    dist_tolerance: float
+    angle_tolerance: float
+    token: CancelToken
+
+    def result(self, planner: AbstractPlanner, pair: Pair) -> GetPathResult:
+        """The plan of a pair; whatever goes wrong with it is its outcome, as the other pairs go on."""
+        try:
+            return self._planned(planner, pair)
+        except BaseException as error:  # also a sys.exit(); a Ctrl-C comes to the main thread only
+            text = f"planning this pair raised {type(error).__name__}: {error_text(error)}"
+            return GetPathResult(GetPathOutcome.INTERNAL_ERROR, text, planner=planner.name)
+
+    def _planned(self, planner: AbstractPlanner, pair: Pair) -> GetPathResult:
+        runtime, tolerances = self.server.runtime, (self.dist_tolerance, self.angle_tolerance)
+        try:
+            start, goal = (in_global_frame(pose, runtime) for pose in pair)
+        except TransformError as error:
+            return GetPathResult(GetPathOutcome.TF_ERROR, str(error), planner=planner.name)
+        request = PlanRequest(start, goal, *tolerances, cancel_token=self.token)
+        missing = self.server.missing_floor()
+        no_map = PlanResult(GetPathOutcome.MAP_ERROR, missing, permanent=True)
+        return path_result(no_map if missing else _ask(planner, request), request, runtime, planner.name)
 
 
 def _ask(planner: AbstractPlanner, request: PlanRequest) -> PlanResult:
@@ -158,6 +191,6 @@ def _ask(planner: AbstractPlanner, request: PlanRequest) -> PlanResult:
         return checked_answer(planner.make_plan(request), PlanResult, planner.name, "make_plan")
     except PluginFault as fault:
         text = str(fault)
-    except Exception as error:
+    except BaseException as error:
         text = f"plugin {planner.name!r} raised {type(error).__name__} in make_plan: {error_text(error)}"
     return PlanResult(GetPathOutcome.INTERNAL_ERROR, text)

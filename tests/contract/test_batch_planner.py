@@ -10,7 +10,6 @@ import trimesh
 
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import GetPathOutcome
@@ -113,7 +112,11 @@ def played(*answers):
 
 @pytest.mark.parametrize(
     ("answer", "text"),
-    [(RuntimeError("no luck"), "raised RuntimeError in make_plan: no luck"), ("done", "returned str from make_plan")],
+    [
+        (RuntimeError("no luck"), "raised RuntimeError in make_plan: no luck"),
+        (SystemExit(3), "raised SystemExit in make_plan: 3"),
+        ("done", "returned str from make_plan"),
+    ],
 )
 def test_a_fault_of_the_planner_is_the_outcome_of_its_pair(answer, text):
     def only_far(request):
@@ -165,6 +168,50 @@ def test_what_is_left_after_a_cancel_is_canceled():
     assert [(result.outcome, result.message) for result in rest] == [(GetPathOutcome.CANCELED, "enough")] * 2
 
 
+@pytest.mark.parametrize("backend", CONFIGURATIONS)
+def test_one_bad_pair_is_an_outcome_and_leaves_the_others_as_they_are(servers, backend):
+    server = servers[backend]
+    starts, goals = pairs(server)
+    batch = BatchPlanner(server, "astar", workers=2)
+    alone = batch.plan_many(starts, goals)
+    lost = [Pose.planar(1.0, 1.0, frame_id="moon"), *goals[1:]]
+    mixed = batch.plan_many([*starts, starts[0]], [*goals, lost[0]])
+    assert mixed[-1].outcome == GetPathOutcome.TF_ERROR and "moon" in mixed[-1].message
+    assert (mixed[-1].path, mixed[-1].planner) == (None, "astar")
+    assert [substance(result) for result in mixed[:-1]] == [substance(result) for result in alone]
+
+
+@pytest.mark.parametrize("backend", CONFIGURATIONS)
+def test_a_map_that_raises_is_the_outcome_of_the_pairs_it_raises_for(servers, backend, monkeypatch):
+    server, calls = servers[backend], []
+
+    def raises_once():
+        calls.append(None)
+        if len(calls) == 2:
+            raise OSError("no tile")
+        return ""
+
+    monkeypatch.setattr(server, "missing_floor", raises_once)
+    starts, goals = ([pose] * 4 for pose in (server.ground_pose(1.0, 1.0), server.ground_pose(2.0, 1.0)))
+    results = BatchPlanner(server, "astar", workers=1).plan_many(starts, goals)
+    assert [result.success for result in results] == [True, False, True, True]
+    assert results[1].outcome == GetPathOutcome.INTERNAL_ERROR
+    assert results[1].message == "planning this pair raised OSError: no tile"
+
+
+@pytest.mark.parametrize("backend", CONFIGURATIONS)
+def test_a_cancel_ends_all_that_is_left_and_the_next_batch_plans_as_before(servers, backend):
+    server = servers[backend]
+    starts, goals = pairs(server)
+    batch, token = BatchPlanner(server, "astar", workers=2), CancelToken()
+    before = batch.plan_many(starts, goals)
+    token.cancel("enough")
+    canceled = batch.plan_many(starts, goals, cancel_token=token)
+    assert [(one.outcome, one.message, one.path) for one in canceled] == [(GetPathOutcome.CANCELED, "enough", None)] * 8
+    assert batch.plan_many([], [], cancel_token=token) == []
+    assert [substance(one) for one in batch.plan_many(starts, goals)] == [substance(one) for one in before]
+
+
 def test_two_pairs_are_planned_at_the_same_time():
     both = Barrier(2, timeout=60.0)
 
@@ -198,7 +245,7 @@ def test_no_pairs_give_no_plans(session):
     [
         ({"goals": []}, ValueError, "as many starts as goals are needed, got 1 and 0"),
         ({"dist_tolerance": float("nan")}, ValueError, "tolerances must not be negative"),
-        ({"goals": [Pose.planar(1.0, 0.0, frame_id="moon")]}, TransformError, "moon"),
+        ({"goals": [None]}, TypeError, r"goals\[0\] must be a Pose, got NoneType"),
     ],
 )
 def test_misuse_is_one_clear_error(session, arguments, error, text):
