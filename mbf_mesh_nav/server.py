@@ -134,7 +134,7 @@ class MeshNavigationServer(MapServer):
             served.parameters = self.config.sections["mesh_map"].parameters
             self.map_notes.forget()
             self._report_findings()
-            served.report_configuration_warnings()
+            served.report_configuration_warnings(anew=True)
         finally:
             for plugin in held:
                 plugin.release(self)

@@ -89,6 +89,10 @@ class LayeredMap(NavigationMap):
         """Why the map is not current at ``now`` [s]: a layer that raised, or a silent sensor; empty if it is."""
         return self.layers.stale_reason(now)
 
+    def configuration_warnings(self) -> list[str]:
+        """Legal but suspicious parameters of the layers, a text each."""
+        return self.layers.configuration_warnings()
+
     def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
         """The objects of all layers that follow some, at ``now`` [s]."""
         with self._lock:

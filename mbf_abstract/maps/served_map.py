@@ -67,6 +67,7 @@ class ServedMap(Generic[Map]):
         self._runtime = runtime
         self.transform_tolerance = transform_tolerance
         self._motions = MotionChanges()
+        self._warnings: list[str] = []  # those that have been reported and still hold
         self._floors = navigation_map.floors_taken  # that have been reported
         self._lock = threading.Lock()
         self._users, self._running, self._idle_since = 0, False, runtime.clock.now()
@@ -167,10 +168,17 @@ class ServedMap(Generic[Map]):
         self._runtime.events.emit(EventKind.PARAMETER_CHANGED, what, **changes)
         self.report_configuration_warnings()
 
-    def report_configuration_warnings(self) -> None:
-        """Report legal but suspicious parameters in the event log and as notes of the server."""
-        for warning in self.map.configuration_warnings():
-            self._runtime.events.emit(EventKind.MAP, self.name, message=f"{self.name}: {warning}")
+    def report_configuration_warnings(self, *, anew: bool = False) -> None:
+        """Report legal but suspicious parameters in the event log and as notes of the server, each once.
+
+        What was reported before and holds no longer is withdrawn; with ``anew`` nothing was reported of this map.
+        """
+        before = [] if anew else self._warnings
+        self._warnings = [f"{self.name}: {warning}" for warning in self.map.configuration_warnings()]
+        for text in (text for text in before if text not in self._warnings):
+            self._runtime.events.emit(EventKind.MAP, self.name, message=f"no longer: {text}", withdrawn=text)
+        for text in (text for text in self._warnings if text not in before):
+            self._runtime.events.emit(EventKind.MAP, self.name, message=text)
 
     def close(self) -> None:
         """End the updates."""

@@ -13,16 +13,22 @@ from mbf_abstract.server.plugin_table import PluginTable
 
 
 class MapNotes:
-    """What was reported of the maps that are served now, as notes."""
+    """What was reported of the maps that are served now and not withdrawn since, as notes, each once."""
 
     def __init__(self, events: EventBus) -> None:
         self._events = events
         self._outdated: tuple[Event, ...] = ()
 
     def __iter__(self) -> Iterator[str]:
+        notes = dict[str, None]()
         for event in self._reported():
-            if not any(event is old for old in self._outdated):
-                yield str(event.data.get("message", ""))
+            if any(event is old for old in self._outdated):
+                continue
+            if "withdrawn" in event.data:
+                notes.pop(str(event.data["withdrawn"]), None)
+            else:
+                notes[str(event.data.get("message", ""))] = None
+        yield from notes
 
     def forget(self) -> None:
         """Leave out what has been reported until now: the map of that is no longer there."""
