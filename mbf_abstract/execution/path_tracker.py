@@ -58,6 +58,10 @@ class PathTracker:
         Segments that are driven backward: they lead against the heading of their poses.
     cusps : (k,) float64
         Lengths along the path [m] of its cusps, and of its end.
+    length : float
+        Of the path [m].
+    next_cusp, last_cusp : float
+        Length along the path [m] of the next cusp, or of the end, and of the one before it, or of the start.
     progress : float
         Length along the path [m] of the point the robot has got to.
     deviation : float
@@ -70,6 +74,7 @@ class PathTracker:
         self.path = path
         self.points: FloatArray = np.ascontiguousarray(path.positions[:, :dimensions])
         self.lengths = polyline_lengths(self.points)
+        self.length = float(self.lengths[-1]) if len(self.lengths) else 0.0
         self.reverse = reverse_segments(path, self.points)
         self.cusps: FloatArray = find_cusps(self.points, self.lengths, self.reverse)
         self.deviation, self.cusp_reached, self._joined = 0.0, CUSP_REACHED, False
@@ -81,11 +86,6 @@ class PathTracker:
         return self.path[len(self.path) - 1]
 
     @property
-    def length(self) -> float:
-        """Length of the path [m]."""
-        return float(self.lengths[-1]) if len(self.lengths) else 0.0
-
-    @property
     def remaining(self) -> float:
         """Length [m] left along the path."""
         return self.length - self.progress
@@ -94,18 +94,6 @@ class PathTracker:
     def driving_backward(self) -> bool:
         """Whether the segment ahead is driven in reverse."""
         return bool(len(self.reverse)) and bool(self.reverse[min(self._segment, len(self.reverse) - 1)])
-
-    @property
-    def next_cusp(self) -> float:
-        """Length along the path [m] of the next cusp, or of the end."""
-        ahead = int(np.searchsorted(self.cusps, self.progress + _POSITION_NOISE))
-        return float(self.cusps[min(ahead, len(self.cusps) - 1)])
-
-    @property
-    def last_cusp(self) -> float:
-        """Length along the path [m] of the cusp before the next one, or of the start."""
-        behind = int(np.searchsorted(self.cusps, self.progress + _POSITION_NOISE))
-        return float(self.cusps[behind - 1]) if behind > 0 else 0.0
 
     @property
     def to_cusp(self) -> float:
@@ -192,7 +180,10 @@ class PathTracker:
 
     def _advance(self, progress: float) -> None:
         self.progress = progress
-        self._segment = max(int(np.searchsorted(self.lengths, progress + _POSITION_NOISE, side="right")) - 1, 0)
+        self._segment = max(int(self.lengths.searchsorted(progress + _POSITION_NOISE, side="right")) - 1, 0)
+        ahead = int(self.cusps.searchsorted(progress + _POSITION_NOISE))
+        self.next_cusp = float(self.cusps[min(ahead, len(self.cusps) - 1)])
+        self.last_cusp = float(self.cusps[ahead - 1]) if ahead > 0 else 0.0
 
     def _nearest_ahead(self, robot: list[float], end: float) -> float:
         """Length along the path [m], up to ``end``, of the point nearest to a robot; the earliest of equals.

@@ -19,6 +19,8 @@ Float32Array = NDArray[np.float32]
 
 PATH_SPACING = 0.1
 """Distance [m] of the path points the critics compare with."""
+SMALL = 1e-20
+"""A half turn [rad] whose sine is as large as itself."""
 
 
 def roll_out(
@@ -87,6 +89,9 @@ def _path_ahead(cycle: ControlCycle, length: float) -> tuple[NDArray[np.float64]
 def _free_points(cycle: ControlCycle, points: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(m,) bool: whether path points lie in cells below the inscribed cost; unknown and outside are free."""
     cells, inside = cycle.costmap.world_to_cells(points)
+    if inside.all():
+        costs = cycle.costmap.cells[cells[:, 1], cells[:, 0]]
+        return np.asarray((costs < INSCRIBED) | (costs > LETHAL))
     free = np.ones(len(points), dtype=bool)
     costs = cycle.costmap.cells[cells[inside, 1], cells[inside, 0]]
     free[inside] = (costs < INSCRIBED) | (costs > LETHAL)
@@ -131,11 +136,14 @@ def is_free(cycle: ControlCycle, velocities: Float32Array, dt: float) -> bool:
 
 def driven_poses(pose: tuple[float, float, float], velocities: FloatArray, dt: float) -> FloatArray:
     """Poses (n, 3: x, y, yaw) after each of velocities (n, 3: vx, vy, wz) kept for ``dt`` [s], from ``pose`` on."""
-    turns = velocities[:, 2] * dt
-    yaws = pose[2] + np.cumsum(turns)
-    headings = yaws - 0.5 * turns  # of the chords
-    chords = dt * np.sinc(turns / (2.0 * math.pi))  # sin(half) / half
+    forward, left, turns = velocities[:, 0], velocities[:, 1], velocities[:, 2] * dt
+    poses = np.empty((len(turns), 3))
+    poses[:, 2] = pose[2] + turns.cumsum()
+    headings = poses[:, 2] - 0.5 * turns  # of the chords
+    halves = math.pi * (turns / (2.0 * math.pi))
+    halves[halves == 0.0] = SMALL
+    chords = dt * (np.sin(halves) / halves)
     c, s = np.cos(headings), np.sin(headings)
-    forward, left = velocities[:, 0], velocities[:, 1]
-    x = pose[0] + np.cumsum(chords * (forward * c - left * s))
-    return np.column_stack([x, pose[1] + np.cumsum(chords * (forward * s + left * c)), yaws])
+    poses[:, 0] = pose[0] + (chords * (forward * c - left * s)).cumsum()
+    poses[:, 1] = pose[1] + (chords * (forward * s + left * c)).cumsum()
+    return poses

@@ -196,21 +196,23 @@ class MPPIController(SamplingFollower):
         controls = blend(velocities, costs + self._control_cost(velocities), p.temperature, self._smoothing)[:, :, None]
         self._clip(cycle, controls)
         checked_steps = max(1, round(p.check_ahead_time / cycle.limit_factor / p.model_dt))
-        trajectory = np.empty_like(controls)
-        integrate(controls, cycle.request.pose.yaw, p.model_dt, trajectory)
-        # The mean of passing in front of somebody and passing behind them may lead into them.
-        touches = met.touches
-        best_touches = bool(touches[int(np.argmin(costs))])
-        is_spoiled = not best_touches and bool(around.meet(trajectory, p.model_dt).touches[0])
+        best_touches = around.anybody and bool(met.touches[int(np.argmin(costs))])
+        is_spoiled = around.anybody and not best_touches and self._meets(controls, cycle, around)
         if not is_spoiled and is_free(cycle, controls[:, :checked_steps, 0], p.model_dt):
             return np.asarray(controls[:, :, 0])
         ranked = np.argsort(costs, kind="stable")[:FALLBACK_SAMPLES]
-        if not best_touches:  # those that lead into somebody come last
-            ranked = ranked[np.argsort(touches[ranked], kind="stable")]
+        if around.anybody and not best_touches:  # those that lead into somebody come last
+            ranked = ranked[np.argsort(met.touches[ranked], kind="stable")]
         for sample in ranked.tolist():
             if costs[sample] < COLLISION and is_free(cycle, velocities[:, :checked_steps, sample], p.model_dt):
                 return np.ascontiguousarray(velocities[:, :, sample])
         return None
+
+    def _meets(self, controls: Float32Array, cycle: ControlCycle, around: MovingAround) -> bool:
+        """Whether the mean (3, steps, 1) meets somebody; that of passing in front of them and behind them may."""
+        trajectory = np.empty_like(controls)
+        integrate(controls, cycle.request.pose.yaw, self.parameters.model_dt, trajectory)
+        return bool(around.meet(trajectory, self.parameters.model_dt).touches[0])
 
     def _clip(self, cycle: ControlCycle, velocities: Float32Array) -> None:
         measured = cycle.request.velocity
@@ -221,10 +223,11 @@ class MPPIController(SamplingFollower):
 
     def _control_cost(self, velocities: Float32Array) -> Float32Array:
         """(samples,) price of the first step's distance from the nominal one, per variance (Williams 2018, eq. 29)."""
-        active = self._deviation > 0.0
-        offset = velocities[active, 0] - self._nominal[active, :1]
-        price = self._nominal[active, :1] * offset / self._deviation[active, None] ** 2
-        return np.asarray(np.float32(self.parameters.gamma) * price.sum(axis=0))
+        total = np.zeros(velocities.shape[2], dtype=np.float32)
+        for nominal, sampled, deviation in zip(self._nominal[:, 0], velocities[:, 0], self._deviation, strict=True):
+            if deviation > 0.0:
+                total += nominal * (sampled - nominal) / (deviation * deviation)
+        return np.asarray(np.float32(self.parameters.gamma) * total)
 
     def _command(self, velocity: Float32Array) -> Command:
         """Twist, or steering angle by the single-track model for a robot with a wheelbase."""

@@ -9,6 +9,7 @@ import pytest
 from mbf_abstract.compiling.kernel_cache import compile_lazily
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Twist
+from mbf_abstract.maps.tracking import avoidance
 from mbf_abstract.maps.tracking.kernels import meeting
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
@@ -113,6 +114,7 @@ def test_what_looks_ahead_is_compiled_before_the_robot_drives(backends, monkeypa
     """A robot whose controller compiles while somebody comes drives on unguarded."""
     fresh = compile_lazily(meeting.write_encounters.py_func, error_model="numpy")
     monkeypatch.setattr(meeting, "write_encounters", fresh)
+    avoidance._nobody.cache_clear()
     with site(partial(backends[backend], controller=controller), **PARAMETERS) as made:
         path = made.path((2.0, 4.0), (8.0, 4.0))
         made.server.warm_up(path[0], path[-1])

@@ -203,6 +203,8 @@ def cannot_turn_ahead(tracker: PathTracker, reach: float, fits: Callable[[FloatA
         Whether the outline touches nothing at poses (n, 3: x, y [m], yaw [rad]).
     """
     near = (tracker.cusps >= tracker.progress) & (tracker.cusps <= tracker.progress + reach)
+    if not near.any():
+        return False
     for x, y in tracker.points_at(tracker.cusps[near])[:, :2].tolist():
         if not fits(np.column_stack([np.full(len(HEADINGS), x), np.full(len(HEADINGS), y), HEADINGS])):
             return True

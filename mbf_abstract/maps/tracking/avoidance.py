@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +35,10 @@ the guard of ``contact.py`` sees it then.
 """
 
 
+NO_OBJECTS: Float32Array = np.empty((0, OBJECT_COLUMNS), dtype=np.float32)
+NO_OUTLINE: Float32Array = np.zeros(5, dtype=np.float32)
+
+
 class AvoidanceParameters(ParameterModel):
     """How sampled motions keep away from where moving objects will be."""
 
@@ -54,15 +59,13 @@ class Encounters(NamedTuple):
     costs : (n,) float32
     touched : (n,) int32
         Whom each leads into first who would not touch a robot that stays, among ``MovingAround.moving``, or NOBODY.
+    touches : (n,) bool
+        Whether each leads into somebody.
     """
 
     costs: Float32Array
     touched: NDArray[np.int32]
-
-    @property
-    def touches(self) -> NDArray[np.bool_]:
-        """Whether each motion (n,) leads into somebody."""
-        return np.asarray(self.touched != NOBODY)
+    touches: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,8 @@ class MovingAround:
         """
         known = navigation_map.tracked_objects(now) if limits.weight > 0.0 else ()
         moving = moving_on_storey(known, pose.z, navigation_map.same_storey)
+        if not moving:
+            return cls((), NO_OBJECTS, pose.yaw, NO_OUTLINE, limits)
         rows = [(one.x - pose.x, one.y - pose.y, one.vx, one.vy, one.radius) for one in moving]
         objects = np.array(rows, dtype=np.float32).reshape(-1, OBJECT_COLUMNS)
         return cls(moving, objects, pose.yaw, np.array(navigation_map.robot_box, dtype=np.float32), limits)
@@ -108,10 +113,7 @@ class MovingAround:
         return len(self.objects) > 0
 
     def meet(self, poses: Float32Array, step_time: float) -> Encounters:
-        """What motions meet.
-
-        The kernel is called where nobody moves, too, so that it is not compiled while the robot drives towards the
-        first one who does.
+        """What motions meet. Where nobody moves the answer is kept, and not to be written to.
 
         Parameters
         ----------
@@ -120,10 +122,12 @@ class MovingAround:
         step_time : float
             Length of a step [s].
         """
+        if not self.anybody:
+            return _nobody(poses.shape[2])
         p = self.limits
         stride = max(1, round(LOOK / step_time))
         costs, touched = meet(poses, self.yaw, step_time, stride, self.box, self.objects, p.horizon, p.margin)
-        return Encounters(np.float32(p.weight) * costs, touched)
+        return Encounters(np.float32(p.weight) * costs, touched, touched != NOBODY)
 
     def nearest(self, within: float) -> str:
         """Whom a robot that cannot get on waits for: the nearest, if nearer than ``within`` [m]; empty if nobody."""
@@ -140,5 +144,21 @@ class MovingAround:
         costs : (n,) float
             Of these motions, without those of ``met``.
         """
+        if not self.anybody:
+            return ""
         touched = int(met.touched[int(np.argmin(costs))])
         return "" if touched == NOBODY else in_the_way(self.moving[touched])
+
+
+@lru_cache(maxsize=8)
+def _nobody(samples: int) -> Encounters:
+    """What so many motions meet where nobody moves.
+
+    The kernel is called for it once, so that it is not compiled while the robot drives towards the first one who does.
+    """
+    poses = np.empty((3, 0, samples), dtype=np.float32)
+    costs, touched = meet(poses, 0.0, LOOK, 1, NO_OUTLINE, NO_OBJECTS, 1.0, 1.0)
+    answer = Encounters(costs, touched, touched != NOBODY)
+    for array in answer:
+        array.flags.writeable = False
+    return answer

@@ -120,16 +120,16 @@ def integrate(velocities: Float32Array, yaw: float, dt: float, poses: Float32Arr
 def add_noise(nominal: Float32Array, noise: Float32Array, deviation: Float32Array, velocities: Float32Array) -> None:
     """Fill velocities (3, steps, samples) with ``nominal`` (3, steps) plus noise times deviation (3,).
 
-    The output is an argument so that a controller can use one buffer in all cycles.
+    A direction without deviation is one that the robot does not have: ``clip_velocities`` fills it. The output is an
+    argument so that a controller can use one buffer in all cycles.
     """
     components, steps, samples = noise.shape
     for component in range(components):
         scale = deviation[component]
+        if scale == 0.0:
+            continue
         for t in range(steps):
             base = nominal[component, t]
-            if scale == 0.0:  # a direction this robot does not have
-                velocities[component, t] = base
-                continue
             row, out = noise[component, t], velocities[component, t]
             for n in range(samples):
                 out[n] = base + scale * row[n]
