@@ -52,9 +52,18 @@ def read_elevation(path: Path, max_faces: int) -> tuple[FloatArray, NDArray[np.i
         read: ElevationReader = elevation_readers()[path.suffix.lower()].load()
         heights, dx, dy = read(path, max_faces // 2)  # two faces between four samples
         vertices, faces = heightfield_mesh(heights, dx, dy, keep_grid=True)
+        if not len(faces):
+            raise MeshError(str(path), [_without_faces(heights)])
     except MeshError:
         raise
     except Exception as error:  # whatever the reader of another package raises
         reason = str(error).removeprefix(f"{path}: ")
         raise MeshError(str(path), [f"cannot be read as an elevation model: {reason}"]) from error
     return vertices, faces.astype(np.int64)
+
+
+def _without_faces(heights: NDArray[Any]) -> str:
+    """Why heights (ny, nx) make no surface."""
+    known, (rows, columns) = int(np.isfinite(heights).sum()), heights.shape
+    got = f"got {known} known ones of {rows} x {columns}" if known else f"got {rows} x {columns} voids"
+    return f"expected four known heights side by side, {got}; no number and the file's no-data value are voids"

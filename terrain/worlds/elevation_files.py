@@ -108,8 +108,10 @@ def read_dem(path: str | Path, max_samples: int = MAX_SAMPLES) -> Heightfield:
     """
     try:
         return _filled(read_elevation(path, max_samples))
+    except TerrainFileError:
+        raise
     except ValueError as error:
-        raise TerrainFileError(path, f"cannot be read: {error}") from error
+        raise TerrainFileError(path, str(error)) from error
 
 
 def read_elevation(path: str | Path, max_samples: int = MAX_SAMPLES) -> Elevation:
@@ -157,7 +159,9 @@ def _filled(elevation: Elevation) -> Heightfield:
     """Fill voids from the nearest valid sample; raises ValueError where more than half of the raster is void."""
     heights, bad = elevation.heights, np.isnan(elevation.heights)
     if bad.mean() > MAX_VOID_SHARE:
-        raise ValueError(f"{bad.mean():.0%} of the samples are void")
+        rows, columns = heights.shape
+        got = f"got {int(bad.sum())} voids of {rows} x {columns}; no number and the file's no-data value are voids"
+        raise ValueError(f"expected heights at half of the samples or more, {got}")
     if bad.any():
         _, (rows, columns) = ndimage.distance_transform_edt(bad, return_indices=True)
         heights = heights[rows, columns]

@@ -161,7 +161,8 @@ def _read(file: Path, max_points: int, up_axis: str, unit: float) -> tuple[Store
         return read_run_points(file, max_points), True
     ending = file.suffix.lower()
     if ending in elevation_readers():
-        raise MeshError(str(file), ["an elevation model is a map as it is: mbf plan and mesh_map.mesh_file read it"])
+        text = "expected points, got an elevation model; it is a map as it is, mbf plan and mesh_map.mesh_file read it"
+        raise MeshError(str(file), [text])
     if ending not in READERS and ending not in MESH_ENDINGS:
         known = ", ".join(sorted({*READERS, *MESH_ENDINGS}))
         raise MeshError(str(file), [f"unknown ending '{file.suffix}'; known: {known}"])

@@ -68,5 +68,5 @@ def test_meshes_that_cannot_be_sampled_and_elevation_models_are_refused(tmp_path
         read_clouds([exported(tmp_path / "hill.obj")], max_points=5000)
     with pytest.raises(MeshError, match="its faces have no area"):
         read_clouds([exported(tmp_path / "line.off", np.eye(3) * 0.0, [[0, 1, 2]])])
-    with pytest.raises(MeshError, match="an elevation model is a map as it is"):
+    with pytest.raises(MeshError, match="expected points, got an elevation model; it is a map as it is"):
         read_clouds([tmp_path / "survey.tif"])

@@ -17,6 +17,7 @@ from mbf_mesh_nav.map.map_builder import build_mesh_map
 from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.repair import MeshError
+from terrain.worlds.elevation_files import TerrainFileError, read_dem
 
 ASC = "ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 2\nNODATA_value -9999\n1 2 3 4\n5 6 7 8\n9 10 11 -9999\n"
 
@@ -102,7 +103,7 @@ def test_an_elevation_model_is_a_mesh_whose_voids_are_holes(tmp_path, ending):
             "ncols 3\nnrows 2\n1 2 3 4 5 6\n",
             "cannot be read as an elevation model: expected cellsize in the header, got none",
         ),
-        ("a.asc", "ncols 2\nnrows 2\ncellsize 1\nnodata_value 0\n0 0 0 0\n", "no face"),
+        ("a.asc", "ncols 2\nnrows 2\ncellsize 1\nnodata_value 0\n0 0 0 0\n", "got 2 x 2 voids"),
         ("a.tif", "no tiff", "cannot be read"),
         ("a.npz", "no zip", "cannot be read"),
     ],
@@ -113,6 +114,49 @@ def test_a_bad_elevation_model_is_one_error_that_begins_with_its_name(tmp_path, 
         read_mesh(tmp_path / name)
     assert str(error.value).count(f"{tmp_path / name}: ") == 1
     assert len(error.value.reasons) == 1
+
+
+def write_voids(file, heights, no_data):
+    """Heights (n, n) in the format of a file's ending."""
+    if file.suffix == ".asc":
+        rows = "\n".join(" ".join(map(str, row)) for row in heights.tolist())
+        file.write_text(f"ncols {len(heights)}\nnrows {len(heights)}\ncellsize 1\nNODATA_value {no_data}\n{rows}\n")
+    elif file.suffix == ".hgt":
+        np.nan_to_num(heights, nan=-32768).astype(">i2").tofile(file)
+    elif file.suffix == ".npz":
+        np.savez(file, z=heights, dx=1.0, dy=1.0)
+    else:
+        tags = ImageFileDirectory_v2()
+        tags[33550], tags.tagtype[33550] = (1.0, 1.0, 0.0), 12
+        tags[42113], tags.tagtype[42113] = str(no_data), 2
+        Image.fromarray(heights.astype(np.float32)).save(file, tiffinfo=tags)
+
+
+@pytest.mark.parametrize("name", ["void.asc", "void.tif", "N44W072.hgt", "void.npz"])
+@pytest.mark.parametrize("value", [np.nan, -9999.0])
+def test_a_file_of_voids_is_one_error_with_what_was_expected_and_what_came(tmp_path, name, value):
+    file, heights = tmp_path / name, np.full((6, 6), np.nan if name[-3:] in ("hgt", "npz") else value)
+    write_voids(file, heights, -9999)
+    reason = (
+        "expected four known heights side by side, got 6 x 6 voids; no number and the file's no-data value are voids"
+    )
+    with pytest.raises(MeshError) as error:
+        read_mesh(file)
+    assert (str(error.value), error.value.reasons) == (f"{file}: {reason}", [reason])
+    with pytest.raises(TerrainFileError) as error:
+        read_dem(file)
+    expected = (
+        "expected heights at half of the samples or more, got 36 voids of 6 x 6; no number and the file's no-data"
+    )
+    assert str(error.value).startswith(f"{file}: {expected}")
+
+
+def test_known_heights_of_which_no_four_are_neighbours_are_counted(tmp_path):
+    heights = np.full((6, 6), np.nan)
+    heights[::2, ::2] = 1.0
+    write_voids(tmp_path / "sparse.tif", heights, -9999)
+    with pytest.raises(MeshError, match="expected four known heights side by side, got 9 known ones of 6 x 6"):
+        read_mesh(tmp_path / "sparse.tif")
 
 
 def test_an_elevation_model_with_too_many_faces_is_refused(tmp_path):
