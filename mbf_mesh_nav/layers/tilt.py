@@ -106,6 +106,13 @@ class TiltLayer(MeshLayer):
         self.pitch: Float32Array = np.zeros(shape, dtype=np.float32)
         self.allowed: BoolArray = np.ones(shape, dtype=np.bool_)
 
+    def lethal_reason(self, vertex: int) -> str:
+        """How many headings are allowed and needed, and the error of the heights that the limits are narrowed by."""
+        needed, errors = _count_of(self.parameters.needed_headings), errors_for(self)
+        error = errors if isinstance(errors, float) else float(errors[vertex])
+        narrowed = f", with an error of the heights of {error:.3f} m" if error > 0.0 else ""
+        return f"{np.count_nonzero(self.allowed[vertex])} of {HEADINGS} headings are allowed, {needed} needed{narrowed}"
+
     @classmethod
     def reach(cls, parameters: TiltParameters) -> float:
         """From the middle of the robot to its wheels, and as far again for what lies between them."""

@@ -119,6 +119,15 @@ class MeshLayer(map_layer.MapLayer):
         """
         return math.inf
 
+    def lethal_reason(self, vertex: int) -> str:
+        """Why a vertex is lethal, for a user who wonders; empty if there is nothing to say. Called on any thread."""
+        limit = getattr(self.parameters, "threshold", None)
+        if limit is None:
+            return ""
+        cost, unit = float(self.costs[vertex]), f" {self.unit}" if self.unit else ""
+        narrowed = "" if cost > limit else ", lowered for the error of the map's heights"
+        return f"{cost:.3g}{unit}, threshold {limit:g}{unit}{narrowed}"
+
     @abstractmethod
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Compute all values anew from mesh, parameters and inputs."""

@@ -87,7 +87,12 @@ def _cost_at(point: SurfacePoint, corner_costs: list[float]) -> float:
 
 
 def describe_blockage(mesh_map: MeshMap, snapshot: MeshSnapshot, vertex: int, cost_limit: float) -> str:
-    """Why a vertex is blocked: its cost, the limit, and the layers that call it lethal."""
-    names = [name for name, layer in mesh_map.layers.items() if layer.lethal[vertex]]
-    layers = f" (lethal in layer {', '.join(names)})" if names else ""
-    return f"cost {snapshot.costs[vertex]:.3g}, limit {cost_limit:g}{layers}"
+    """Why a vertex is blocked: the layers that make it lethal, not those that take it over from them, or its cost."""
+    reasons = []
+    for name, layer in mesh_map.layers.items():
+        if layer.lethal[vertex] and not any(read.lethal[vertex] for read in layer.inputs):
+            reason = layer.lethal_reason(vertex)
+            reasons.append(f"{name} ({reason})" if reason else name)
+    if reasons:
+        return f"lethal in layer {', '.join(reasons)}"
+    return f"cost {snapshot.costs[vertex]:.3g}, limit {cost_limit:g}"

@@ -99,17 +99,12 @@ def jacksboro(
 
 
 def read_dem(path: str | Path, max_samples: int = MAX_SAMPLES) -> Heightfield:
-    """Read an elevation model and fill its voids; parameters and errors as in ``read_elevation``.
+    """Read an elevation model and fill its voids; parameters as in ``read_elevation``.
 
-    Raises
-    ------
-    TerrainFileError
-        Also where more than half of the raster is void.
+    Raises TerrainFileError as that does, and where more than half of the raster is void.
     """
     try:
         return _filled(read_elevation(path, max_samples))
-    except TerrainFileError:
-        raise
     except ValueError as error:
         raise TerrainFileError(path, str(error)) from error
 
@@ -159,8 +154,7 @@ def _filled(elevation: Elevation) -> Heightfield:
     """Fill voids from the nearest valid sample; raises ValueError where more than half of the raster is void."""
     heights, bad = elevation.heights, np.isnan(elevation.heights)
     if bad.mean() > MAX_VOID_SHARE:
-        rows, columns = heights.shape
-        got = f"got {int(bad.sum())} voids of {rows} x {columns}; no number and the file's no-data value are voids"
+        got = "got {} voids of {} x {}; no number and the file's no-data value are voids".format(bad.sum(), *bad.shape)
         raise ValueError(f"expected heights at half of the samples or more, {got}")
     if bad.any():
         _, (rows, columns) = ndimage.distance_transform_edt(bad, return_indices=True)

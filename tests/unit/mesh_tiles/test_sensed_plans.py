@@ -91,7 +91,7 @@ def test_a_tile_that_changes_keeps_what_was_sensed_on_it(tiled_hills, way, tmp_p
         tiled.change_layer(key, "safe", tile.costs[row].copy(), tile.lethal[row].copy())
     (still,) = planned(HierarchicalPlanner, tiled, request)
     assert blocked.outcome == still.outcome == GetPathOutcome.BLOCKED_GOAL
-    assert "lethal in layer obstacles, around, shown" in still.message
+    assert "is blocked: lethal in layer obstacles" in still.message
     assert tiled.point_check()(pose(way[12])).state == CellState.LETHAL
 
 
