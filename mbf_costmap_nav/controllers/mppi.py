@@ -164,7 +164,7 @@ class MPPIController(SamplingFollower):
             left = cycle.tracker.remaining
             text = f"no feasible motion of the car makes progress, {left:.2f} m before the end of its path"
             return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
-        self._nominal = np.column_stack([controls[:, 1:], controls[:, -1]])
+        self._nominal = np.concatenate([controls[:, 1:], controls[:, -1:]], axis=1)
         return ControlResult(ExePathOutcome.SUCCESS, "", self._command(controls[:, 0]), self._hindered_by)
 
     def _is_stuck(self, controls: Float32Array) -> bool:
@@ -184,7 +184,8 @@ class MPPIController(SamplingFollower):
         """Best velocities (3, steps) around the nominal ones, or None if nothing fits."""
         p, velocities = self.parameters, self._velocities
         add_noise(self._nominal, self._noise[int(self.rng.integers(NOISE_POOL))], self._deviation, velocities)
-        self._clip(cycle, velocities)
+        limits = *self._bounds(cycle), self._change, self._radius, cycle.speed_limit
+        clip_velocities(velocities, *limits)
         reach = p.max_vel_x * p.model_dt * p.time_steps
         rollouts = roll_out(cycle, velocities, p.model_dt, reach, self._poses, self._radius)
         costs = score(p.critics, rollouts)
@@ -194,7 +195,7 @@ class MPPIController(SamplingFollower):
         self._hindered_by = around.hindering(met, costs)
         costs += met.costs
         controls = blend(velocities, costs + self._control_cost(velocities), p.temperature, self._smoothing)[:, :, None]
-        self._clip(cycle, controls)
+        clip_velocities(controls, *limits)
         checked_steps = max(1, round(p.check_ahead_time / cycle.limit_factor / p.model_dt))
         best_touches = around.anybody and bool(met.touches[int(np.argmin(costs))])
         is_spoiled = around.anybody and not best_touches and self._meets(controls, cycle, around)
@@ -214,12 +215,12 @@ class MPPIController(SamplingFollower):
         integrate(controls, cycle.request.pose.yaw, self.parameters.model_dt, trajectory)
         return bool(around.meet(trajectory, self.parameters.model_dt).touches[0])
 
-    def _clip(self, cycle: ControlCycle, velocities: Float32Array) -> None:
+    def _bounds(self, cycle: ControlCycle) -> tuple[Float32Array, Float32Array, Float32Array]:
+        """Measured velocity (3,), and the least and the largest one (3,) of this cycle."""
         measured = cycle.request.velocity
         now = np.array([measured.vx, measured.vy, measured.wz], dtype=np.float32)
         limit = np.array([cycle.speed_limit, cycle.speed_limit, np.inf], dtype=np.float32)
-        low, high = np.maximum(self._low, -limit), np.minimum(self._high, limit)
-        clip_velocities(velocities, now, low, high, self._change, self._radius, cycle.speed_limit)
+        return now, np.maximum(self._low, -limit), np.minimum(self._high, limit)
 
     def _control_cost(self, velocities: Float32Array) -> Float32Array:
         """(samples,) price of the first step's distance from the nominal one, per variance (Williams 2018, eq. 29)."""
