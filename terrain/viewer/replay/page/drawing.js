@@ -1,5 +1,5 @@
 // A thin layer over WebGL 2 that counts draw calls, triangles and bytes on the graphics card; see budget() in main.js.
-const SHADOW_SIZE = 2048;
+const SHADOW_SIZE = 2048, SMALL_SHADOW_SIZE = 1024;  // pixels; the small one where the processor draws
 
 class Drawing {
   constructor(canvas) {
@@ -89,17 +89,17 @@ class Drawing {
 
   points(count) { if (count) { this.gl.drawArrays(this.gl.POINTS, 0, count); this.count(0); } }
 
-  shadowMap() {
+  shadowMap(size) {
     const gl = this.gl, texture = gl.createTexture(), frame = gl.createFramebuffer();
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT24, SHADOW_SIZE, SHADOW_SIZE);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT24, size, size);
     for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_MAG_FILTER, gl.LINEAR],
       [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE],
       [gl.TEXTURE_COMPARE_MODE, gl.COMPARE_REF_TO_TEXTURE]]) gl.texParameteri(gl.TEXTURE_2D, name, value);
     gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, texture, 0);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    this.sizes.set(texture, 4 * SHADOW_SIZE * SHADOW_SIZE);
+    this.sizes.set(texture, 4 * size * size);
     return frame;
   }
 }

@@ -18,7 +18,7 @@ class Replay {
     const changed = () => { this.dirty = true; };
     this.player = new Player(run, changed, this.pace.software);
     this.panel = new Panel(run, at => this.player.jump(at));
-    this.world = new World(this.drawing, scene, arrays);
+    this.world = new World(this.drawing, scene, arrays, this.pace.software);
     this.bodies = new Bodies(this.drawing, scene, arrays);
     this.lines = new Lines(this.drawing, scene, arrays, this.bodies.times);
     this.labels = new Labels(document.getElementById('labels'), scene.marks, this.bodies.robots);

@@ -3,7 +3,7 @@ const LEAST_PIXELS = 2.5;  // a level of detail is coarse enough while its cells
 const SHADOW_STEP = 0.25;  // m by which the cut may move until shadows are drawn anew
 
 class World {
-  constructor(drawing, scene, arrays) {
+  constructor(drawing, scene, arrays, software) {
     const gl = drawing.gl;
     this.drawing = drawing;
     this.size = scene.size;
@@ -27,7 +27,8 @@ class World {
     this.steps = scene.layers.steps;
     this.program = drawing.program(WORLD_VERTEX, WORLD_FRAGMENT);
     this.depth = drawing.program(WORLD_VERTEX, DEPTH_FRAGMENT);
-    this.shadows = drawing.shadowMap();
+    this.shadowSize = software ? SMALL_SHADOW_SIZE : SHADOW_SIZE;
+    this.shadows = drawing.shadowMap(this.shadowSize);
     this.shadowCut = null;
     this.looks = {size: scene.size, light: scene.light, paints: scene.paints.flat(), slopes: scene.slopes.flat(),
       stops: scene.stops, contour: scene.contour, steps: 0, forbidden: scene.layers.forbidden, nowhere: scene.layers.nowhere};
@@ -62,7 +63,7 @@ class World {
     const gl = this.drawing.gl, finest = this.levels[0];
     this.shadowCut = cut;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.shadows);
-    gl.viewport(0, 0, SHADOW_SIZE, SHADOW_SIZE);
+    gl.viewport(0, 0, this.shadowSize, this.shadowSize);
     gl.clear(gl.DEPTH_BUFFER_BIT);
     this.drawing.use(this.depth, {view: this.toLight, size: this.size, cut});
     gl.bindVertexArray(this.array);
