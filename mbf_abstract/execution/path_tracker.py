@@ -182,7 +182,7 @@ class PathTracker:
         self.progress = progress
         self._segment = max(int(self.lengths.searchsorted(progress + _POSITION_NOISE, side="right")) - 1, 0)
         ahead = int(self.cusps.searchsorted(progress + _POSITION_NOISE))
-        self.next_cusp = float(self.cusps[min(ahead, len(self.cusps) - 1)])
+        self.next_cusp = float(self.cusps[min(ahead, len(self.cusps) - 1)]) if len(self.cusps) else 0.0
         self.last_cusp = float(self.cusps[ahead - 1]) if ahead > 0 else 0.0
 
     def _nearest_ahead(self, robot: list[float], end: float) -> float:
