@@ -154,7 +154,7 @@ class _Grip:
             command, obstacle = self._before_obstacles(pose)
         except (RobotStateError, TransformError) as error:
             return Twist(), str(error)
-        answer = hooks.avoid_contact(pose, velocity, ControlResult(ExePathOutcome.SUCCESS, command=command))
+        answer = self._runtime.as_safe(pose, velocity, ControlResult(ExePathOutcome.SUCCESS, command=command))
         safe = answer.command if isinstance(answer.command, Twist) else Twist()
         return safe, obstacle or answer.message
 

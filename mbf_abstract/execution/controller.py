@@ -270,8 +270,8 @@ class ControllerExecution:
         return result
 
     def _avoid_contact(self, pose: Pose, velocity: Twist, result: ControlResult) -> ControlResult:
-        """Let the map slow the command down where the robot would touch something that moves."""
-        hook = partial(self._runtime.map_hooks.avoid_contact, pose, velocity, result)
+        """Let the map slow the command down: to its speed limits, and where the robot would touch what moves."""
+        hook = partial(self._runtime.as_safe, pose, velocity, result, self._controller)
         return self._ask_map("avoid_contact", hook, failed=partial(ControlResult, ExePathOutcome.MAP_ERROR))
 
     # ------------------------------------------------------------------------------- judging a command

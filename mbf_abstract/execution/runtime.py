@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from itertools import count
-from typing import Protocol
+from typing import Any, Protocol
 
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.drive.robot import RobotInformation
@@ -45,6 +46,9 @@ class MapHooks(Protocol):
     def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
         """The answer of a controller with a command by which the robot touches nothing that moves."""
 
+    def within_speed_limit(self, pose: Pose, answer: ControlResult, full_speed: float) -> ControlResult:
+        """The answer of a controller with a command within the speed limits of the map's layers."""
+
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
         """What the robot would touch if it kept a command for a time [s], and where; empty = nothing."""
 
@@ -76,6 +80,16 @@ class Runtime:
     """Goal ids, unique in this server."""
     hanging: set[object] = field(default_factory=set)
     """What runs on although its goal has ended: a call that does not come back; capped by ``max_quarantined``."""
+
+    def as_safe(self, pose: Pose, velocity: Twist, answer: ControlResult, controller: Any = None) -> ControlResult:
+        """An answer of a controller, within the speed limits of the map, by which the robot touches nothing that moves.
+
+        Limits in percent are shares of the controller's ``full_speed``, or its ``max_vel_x``, within the robot's.
+        """
+        full = getattr(controller, "full_speed", math.inf)
+        full = min(full, getattr(getattr(controller, "parameters", None), "max_vel_x", math.inf))
+        within = self.map_hooks.within_speed_limit(pose, answer, min(full, self.gate.limits.max_vel_x))
+        return self.map_hooks.avoid_contact(pose, velocity, within)
 
     def velocity_or_command(self, measured: Twist | None) -> Twist:
         """How the robot moves: as measured, and without odometry as last commanded, straight on for a car."""

@@ -24,12 +24,14 @@ Whatever happens, the last command is zero.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.map_plugin import MapPlugin
+from mbf_abstract.maps.navigation_map import NavigationMap
+from mbf_abstract.maps.speed_limits import slow_motion
 from mbf_abstract.maps.tracking.contact_guard import slower
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -69,6 +71,10 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
         finally:
             request.motion.send(Twist())
 
+    def _maps(self) -> Iterable[NavigationMap]:
+        """All maps of the server: speed limits may stand on any."""
+        return self.maps.values() or [self.navigation_map]
+
     def drive(
         self,
         request: RecoveryRequest,
@@ -97,10 +103,11 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
             answer = Twist() if stale else velocity(pose)
             if isinstance(answer, RecoveryResult):
                 return answer
+            answer, forbidden = slow_motion(self._maps(), self.transforms, pose, answer)
             here, measured = self.on_map(pose), motion.velocity()
             moving = last if measured == Twist() else measured  # a robot without odometry measures none
             share, reason, _ = self.navigation_map.safe_share(here, moving, answer, self.clock.now())
-            if obstacle := reason if share == 0.0 else obstacle_ahead(pose, answer):
+            if obstacle := forbidden or (reason if share == 0.0 else obstacle_ahead(pose, answer)):
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, obstacle)
             refusals, last = 0 if motion.send(slower(answer, share)) else refusals + 1, answer
             if refusals > 1 and not token.cancelled:

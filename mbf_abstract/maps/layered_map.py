@@ -118,6 +118,17 @@ class LayeredMap(NavigationMap):
         limits = [layer.parameters for layer in self.layers.enabled]
         return min((limit.max_wait for limit in limits if isinstance(limit, ContactParameters)), default=math.inf)
 
+    def speed_limit_at(self, pose: Pose, full_speed: float) -> float:
+        """The lowest that any layer states; raises ValueError where a layer states no speed that is one."""
+        limit = full_speed
+        with self._lock:
+            for layer in self.layers.enabled:
+                allowed: Any = layer.speed_limit_at(pose, full_speed)
+                if allowed is None or not allowed >= 0.0:
+                    raise ValueError(f"layer {layer.name!r} gives a speed limit of {allowed} m/s, expected 0 or more")
+                limit = min(limit, allowed)
+        return limit
+
     def set_layer_parameters(self, name: str, parameters: Any, until: float = math.inf) -> None:
         """Replace the parameters of one layer, all or none.
 

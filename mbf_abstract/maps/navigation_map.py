@@ -216,6 +216,10 @@ class NavigationMap(ABC):
         """How long [s] a robot may wait for what moves before its path counts as blocked."""
         return math.inf
 
+    def speed_limit_at(self, pose: Pose, full_speed: float) -> float:
+        """Lowest speed [m/s] that layers allow at ``pose``, at most ``full_speed``; see ``speed_limits``."""
+        return full_speed
+
     # -------------------------------------------------------------------------------------------------- layers
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
         """Remove what sensors have marked in layers, in all by default; return the names of those cleared.
@@ -227,10 +231,7 @@ class NavigationMap(ABC):
     def clear_area(
         self, center: Pose, size: float, layer_names: Iterable[str] | None = None, *, inside: bool = True
     ) -> list[str]:
-        """Clear layers within a square of side ``size`` [m] around a pose, or all but it; as ``clear`` otherwise.
-
-        By default these are the layers that sensors fill again.
-        """
+        """Clear layers, by default those that sensors fill, in a square of ``size`` [m] around a pose, or out of it."""
         return []
 
     def usual_parameters(self, name: str) -> Any:

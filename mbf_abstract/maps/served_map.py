@@ -22,6 +22,7 @@ from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE
 from mbf_abstract.maps.tracking.motion_changes import MotionChanges
 from mbf_abstract.maps.tracking.objects import TrackedObject
+from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_abstract.parameters import ParameterModel, with_changes
 from mbf_abstract.time.ticker import Ticker
 
@@ -167,6 +168,14 @@ class ServedMap(Generic[Map]):
     def _report(self, what: str, changes: Mapping[str, Any]) -> None:
         self._runtime.events.emit(EventKind.PARAMETER_CHANGED, what, **changes)
         self.report_configuration_warnings()
+
+    def refusal(self, topic: str, floor: FloorMap | FloorWindow) -> str:
+        """Hand a floor to the map; why it refuses it, empty if it has taken it."""
+        try:
+            self.map.take_floor(topic, floor)
+        except ValueError as error:
+            return f"{self.name}: {error}"
+        return ""
 
     def report_configuration_warnings(self, *, anew: bool = False) -> None:
         """Report legal but suspicious parameters in the event log and as notes of the server, each once.

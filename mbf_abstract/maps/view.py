@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 OCCUPIED, UNKNOWN_OCCUPANCY = 100, 255
 """Occupancies of cells: occupied from the first value on, unknown at the second."""
+LEAST_RESOLUTION, GREATEST_RESOLUTION = 1e-4, 1e3
+"""Sides of cells [m] that maps may have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +45,13 @@ class FloorMap:
         Pose [m, m, rad] of the lower left corner of cell (0, 0).
     frame_id : str
         Frame of that pose; empty = that of who asks.
+
+    Raises
+    ------
+    TypeError
+        The occupancy is no array of uint8.
+    ValueError
+        It has no cells, or the resolution or the pose means nothing.
     """
 
     occupancy: NDArray[np.uint8]
@@ -49,6 +60,15 @@ class FloorMap:
     origin_y: float
     yaw: float = 0.0
     frame_id: str = ""
+
+    def __post_init__(self) -> None:
+        _require_cells("FloorMap", self.occupancy)
+        if not LEAST_RESOLUTION <= self.resolution <= GREATEST_RESOLUTION:
+            limits = f"{LEAST_RESOLUTION:g} to {GREATEST_RESOLUTION:g} m"
+            raise ValueError(f"FloorMap.resolution: expected {limits}, got {self.resolution}")
+        for name, value in (("origin_x", self.origin_x), ("origin_y", self.origin_y), ("yaw", self.yaw)):
+            if not math.isfinite(value):
+                raise ValueError(f"FloorMap.{name}: expected a finite number, got {value}")
 
     def equals(self, other: FloorMap) -> bool:
         """Whether the other map says the same of the same place."""
@@ -84,12 +104,30 @@ class FloorWindow:
         Column and row of its first cell on the map.
     frame_id : str
         That of the map.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As a ``FloorMap``.
     """
 
     occupancy: NDArray[np.uint8]
     x: int
     y: int
     frame_id: str = ""
+
+    def __post_init__(self) -> None:
+        _require_cells("FloorWindow", self.occupancy)
+
+
+def _require_cells(what: str, occupancy: Any) -> None:
+    """Raise where an occupancy is no rectangle of cells."""
+    expected = "(height, width) uint8: 0 free to 100 occupied, 255 unknown"
+    if getattr(occupancy, "dtype", None) != np.uint8:
+        got = f"an array of {occupancy.dtype}" if isinstance(occupancy, np.ndarray) else type(occupancy).__name__
+        raise TypeError(f"{what}.occupancy: expected {expected}, got {got}")
+    if occupancy.ndim != 2 or occupancy.size == 0:
+        raise ValueError(f"{what}.occupancy: expected {expected}, got the shape {occupancy.shape}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -150,6 +150,10 @@ class MapInterface(PluginHost):
         """The answer of a controller with a command by which the robot touches nothing that moves; as it is here."""
         return answer
 
+    def within_speed_limit(self, pose: Pose, answer: ControlResult, full_speed: float) -> ControlResult:
+        """The answer of a controller with a command within the speed limits of the map's layers; as it is here."""
+        return answer
+
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
         """What the robot would touch, and where, if it kept ``command`` for ``duration`` [s]; empty = nothing."""
         return ""

@@ -22,6 +22,7 @@ from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.scan_intake import ScanIntake
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.served_map import ServedMap
+from mbf_abstract.maps.speed_limits import within_speed_limit
 from mbf_abstract.maps.tracking.contact_guard import ContactGuard
 from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_abstract.outcomes import ExePathOutcome
@@ -91,10 +92,12 @@ class MapServer(AbstractNavigationServer):
 
         Raises ValueError where no map expects it, or one refuses it, which does not keep it from the others.
         """
+        if not isinstance(floor, FloorMap | FloorWindow):
+            raise TypeError(f"take_floor: expected a FloorMap or a FloorWindow, got {type(floor).__name__}")
         expecting = [served for served in self.served.values() if topic in served.map.map_topics]
         if not expecting:
             super().take_floor(topic, floor)
-        refusals = [refusal for served in expecting if (refusal := _refusal(served, topic, floor))]
+        refusals = [refusal for served in expecting if (refusal := served.refusal(topic, floor))]
         if refusals:
             raise ValueError("; ".join(refusals))
 
@@ -141,6 +144,11 @@ class MapServer(AbstractNavigationServer):
         except TransformError as error:
             return ControlResult(ExePathOutcome.TF_ERROR, str(error))
         return self._contact_guard.judge(navigation_map, there, velocity, answer, self.runtime.clock.now())
+
+    def within_speed_limit(self, pose: Pose, answer: ControlResult, full_speed: float) -> ControlResult:
+        """Slow down to the lowest limit that layers of any map state for the place."""
+        maps = [served.map for served in self.served.values()]
+        return within_speed_limit(maps, self.runtime.transforms, pose, answer, full_speed)
 
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
         """What the robot would touch on the map that it drives on; see ``NavigationMap.obstacle_ahead``.
@@ -238,12 +246,3 @@ class MapServer(AbstractNavigationServer):
             problem = f"there is no layer {layer!r}" if not found else f"several maps have a layer {layer!r}"
             raise ServerError(f"{problem}; known: {', '.join(places) or 'none'}")
         return places[found[0]]
-
-
-def _refusal(served: ServedMap[Any], topic: str, floor: FloorMap | FloorWindow) -> str:
-    """Why a map refuses a floor; empty if it has taken it."""
-    try:
-        served.map.take_floor(topic, floor)
-    except ValueError as error:
-        return f"{served.name}: {error}"
-    return ""

@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.geometry.polygon import cross_products, crossing_sides
+
 FloatArray = NDArray[np.float64]
 
 LEAST_AREA = 1e-6
@@ -21,8 +23,8 @@ def outline_problem(corners: FloatArray) -> str:
     """
     points = corners[(corners != np.roll(corners, 1, axis=0)).any(axis=1)]
     ends = np.roll(points, -1, axis=0)
-    area = 0.5 * float(abs(np.add.accumulate(_cross(points, ends))[-1])) if len(points) else 0.0
-    crossing = _crossing_sides(points, ends)
+    area = 0.5 * float(abs(np.add.accumulate(cross_products(points, ends))[-1])) if len(points) else 0.0
+    crossing = crossing_sides(points)
     if crossing is not None:
         return f"an outline whose sides do not cross, but side {crossing[0]} meets side {crossing[1]}"
     if not area >= LEAST_AREA:
@@ -32,30 +34,9 @@ def outline_problem(corners: FloatArray) -> str:
     return ""
 
 
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Third component of the cross products of vectors (..., 2)."""
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-
-
-def _crossing_sides(points: FloatArray, ends: FloatArray) -> tuple[int, int] | None:
-    """First two sides, not next to each other, that share a point; None without such a pair."""
-    count = len(points)
-    for i in range(count - 2):
-        others = np.arange(i + 2, count - 1 if i == 0 else count)
-        a, b, c, d = points[i], ends[i], points[others], ends[others]
-        apart = (_cross(b - a, c - a) * _cross(b - a, d - a) > 0.0) | (
-            _cross(d - c, a - c) * _cross(d - c, b - c) > 0.0
-        )
-        low, high = np.minimum(c, d), np.maximum(c, d)
-        apart |= ((high < np.minimum(a, b)) | (low > np.maximum(a, b))).any(axis=1)
-        if not apart.all():
-            return i, int(others[int(np.argmin(apart))])
-    return None
-
-
 def _holds_origin(points: FloatArray, ends: FloatArray) -> bool:
     """Whether the origin lies in a simple polygon or on its sides."""
-    turns = _cross(points, ends)
+    turns = cross_products(points, ends)
     on_side = (turns == 0.0) & (points[:, 0] * ends[:, 0] + points[:, 1] * ends[:, 1] <= 0.0)
     spans = (points[:, 1] > 0.0) != (ends[:, 1] > 0.0)
     to_the_right = spans & ((turns > 0.0) == (ends[:, 1] > points[:, 1]))

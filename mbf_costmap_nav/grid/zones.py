@@ -36,7 +36,7 @@ class Zone(ParameterModel):
     @classmethod
     def _is_an_area(cls, corners: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
         if len(corners) < 3:
-            raise ValueError(f"a zone needs at least 3 corners, got {len(corners)}")
+            raise ValueError(f"a polygon of at least 3 corners, not of {len(corners)}")
         return corners
 
     @property

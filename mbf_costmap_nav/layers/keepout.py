@@ -17,6 +17,7 @@ import numpy as np
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.grid.resampling import sample_costmap
+from mbf_costmap_nav.grid.zones import Zone
 from mbf_costmap_nav.kernels.map.rasterisation import fill_polygon
 from mbf_costmap_nav.map.area_layer import AreaLayer, AreaLayerParameters
 from mbf_costmap_nav.map.layer import CombinationMethod, LayerContext, combine
@@ -35,6 +36,10 @@ class KeepoutLayer(AreaLayer):
         super().__init__(context)
         self._costs = self.mask.to_costmap(context.frame_id) if self.mask is not None else None
         self._changed = EMPTY_BOX
+
+    def zone_warning(self, zone: Zone) -> str:
+        """A limit: nothing drives here."""
+        return "" if zone.speed_limit is None else "speed_limit has no effect in a keep-out layer"
 
     @property
     def permanent(self) -> bool:

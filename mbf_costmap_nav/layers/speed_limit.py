@@ -4,21 +4,23 @@ When to use: ramps, crossings, places with people. When not: to keep the robot o
 cells at all; one look-up per question. Known failure: the limit applies from the moment the robot's centre is inside,
 so draw an area with the distance the robot needs to brake.
 
-It writes no costs; ``LayeredCostmap.speed_limit`` queries it. A zone's ``speed_limit`` is a speed [m/s], or a share of
-the full speed [%] with ``limit_type: percent``. In a mask, limit = ``base`` + ``multiplier`` * occupancy (0..100); free
-and unknown mask cells set no limit (Nav2's speed filter).
+It writes no costs; ``LayeredCostmap.speed_limit`` queries it, and whatever drives is slowed down, see
+``mbf_abstract.maps.speed_limits``. A limit of 0 m/s is none that can be driven at: paths through it are blocked.
+
+A zone's ``speed_limit`` is a speed [m/s], or a share of the full speed [%] with ``limit_type: percent``. In a mask,
+limit = ``base`` + ``multiplier`` * occupancy (0..100); free and unknown mask cells set no limit (Nav2's speed filter).
 """
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.limits import LimitType, lowest
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.files.map_description import UNKNOWN_OCCUPANCY
 from mbf_costmap_nav.grid.costmap import FREE, CellArray, CellBox, Costmap
+from mbf_costmap_nav.grid.zones import Zone
 from mbf_costmap_nav.map.area_layer import AreaLayer, AreaLayerParameters
 from mbf_costmap_nav.map.layer import LayerContext
 
@@ -26,7 +28,7 @@ from mbf_costmap_nav.map.layer import LayerContext
 class SpeedLimitLayerParameters(AreaLayerParameters):
     """Parameters of the speed-limit layer."""
 
-    limit_type: Literal["absolute", "percent"] = parameter("absolute", "Whether limits are m/s or % of full speed.")
+    limit_type: LimitType = parameter("absolute", "Whether limits are m/s or % of full speed.")
     base: float = parameter(100.0, "Limit of a mask cell of occupancy 0, in the unit of limit_type.")
     multiplier: float = parameter(-1.0, "Change of the limit per point of occupancy.")
 
@@ -42,6 +44,13 @@ class SpeedLimitLayer(AreaLayer):
         self._limits: Costmap | None = None
         if (mask := self.mask) is not None:
             self._limits = Costmap(mask.occupancy, mask.resolution, *mask.origin[:2], context.frame_id)
+
+    def zone_warning(self, zone: Zone) -> str:
+        """No limit, or one that is none."""
+        if zone.speed_limit is None:
+            return "it has no speed_limit, so it does nothing"
+        is_all = self.parameters.limit_type == "percent" and zone.speed_limit >= 100.0
+        return f"a speed_limit of {zone.speed_limit:g} percent is no limit" if is_all else ""
 
     @property
     def permanent(self) -> bool:
@@ -63,5 +72,4 @@ class SpeedLimitLayer(AreaLayer):
         occupancy = self._limits.cost_at(x, y) if self._limits is not None else None
         if occupancy is not None and occupancy not in (FREE, UNKNOWN_OCCUPANCY):
             limits.append(max(0.0, self.parameters.base + self.parameters.multiplier * occupancy))
-        scale = full_speed / 100.0 if self.parameters.limit_type == "percent" else 1.0
-        return min([full_speed, *(limit * scale for limit in limits)])
+        return lowest(limits, self.parameters.limit_type, full_speed)

@@ -5,7 +5,10 @@ When to use: for areas that people draw, as forbidden or slow ones. When not: fo
 
 from __future__ import annotations
 
+import numpy as np
+
 from mbf_abstract.config.bounded_files import configured_file
+from mbf_abstract.geometry.polygon import area_warning
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.files.map_io import load_map
@@ -47,6 +50,26 @@ class AreaLayer(CostmapLayer):
             mask_file = configured_file(folder, p.mask_file)
             self.mask = load_map(mask_file, limit, confined=context.confine_images).axis_aligned(limit)
         self.placement = Placement(p.map_frame, context)
+
+    def configuration_warning(self) -> str:
+        """The first zone that is hardly meant as it is: its polygon, its limit, or its place."""
+        for zone in self.zones:
+            if problem := area_warning(zone.corners) or self.zone_warning(zone) or self._off_grid(zone):
+                return f"zone {zone.name!r}: {problem}"
+        return ""
+
+    def zone_warning(self, zone: Zone) -> str:
+        """What of a zone has no effect in this layer; empty if all of it has."""
+        return ""
+
+    def _off_grid(self, zone: Zone) -> str:
+        if self.rolling_window or not self.placement.known:
+            return ""
+        corners, grid = self.placement.to_costmap(zone.corners), self.geometry
+        low = np.array([grid.origin_x, grid.origin_y])
+        high = low + grid.resolution * np.array([grid.width, grid.height])
+        beside = (corners.max(axis=0) <= low) | (corners.min(axis=0) >= high)
+        return "it lies outside of the map" if beside.any() else ""
 
     def stale_reason(self, now: float) -> str:
         """Why the areas cannot be placed: their frame is unknown."""

@@ -117,10 +117,7 @@ class CostmapLayer(MapLayer):
         raise ValueError(f"the layer {self.name!r} expects no floor")
 
     def place_floor(self) -> bool:
-        """Begin an update: make the floor that has come the floor plan; return whether there is another one.
-
-        ``match_geometry`` follows where it is.
-        """
+        """Begin an update: make the floor that has come the floor plan; if there is one, ``match_geometry`` follows."""
         return False
 
     def missing_floor(self) -> str:
@@ -139,7 +136,7 @@ class CostmapLayer(MapLayer):
         self.geometry = geometry
 
     def set_footprint(self, footprint: Footprint, unpadded: Footprint) -> None:
-        """Take over the robot's outline, with its padding and without."""
+        """Take over the outline of the robot, padded and not."""
 
     def parameters_changed(self) -> None:
         """Take over ``parameters``, which have just been replaced; the next update recomputes the whole map.
@@ -180,6 +177,10 @@ class CostmapLayer(MapLayer):
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Allowed speed [m/s] at the point (x, y) [m], at most ``full_speed``."""
         return full_speed
+
+    def speed_limit_at(self, pose: Pose, full_speed: float) -> float:
+        """That of the pose's place."""
+        return self.speed_limit(pose.x, pose.y, full_speed)
 
 
 class GridLayer(CostmapLayer):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
@@ -72,7 +71,7 @@ class LayerAnswers(SnapshotAnswers):
     def configuration_warnings(self) -> list[str]:
         """What is legal but hardly meant: of each layer, none that inflates, and a window smaller than the robot."""
         with self._lock:
-            warnings = self.layers.configuration_warnings()
+            warnings = [] if self.missing_floor() else super().configuration_warnings()
             inflates = any(hasattr(layer.parameters, "inflation_radius") for layer in self.layers.enabled)
             if self.layers and not inflates and self.inscribed_radius > 0.0:
                 radius = f"{self.inscribed_radius:.2f} m"
@@ -90,14 +89,7 @@ class LayerAnswers(SnapshotAnswers):
 
         Raises ValueError where a layer allows no speed that is one.
         """
-        limit = full_speed
-        with self._lock:
-            for layer in self.layers.enabled:
-                allowed: Any = layer.speed_limit(x, y, full_speed)
-                if allowed is None or not allowed >= 0.0:
-                    raise ValueError(f"layer {layer.name!r} gives a speed limit of {allowed} m/s, expected 0 or more")
-                limit = min(limit, allowed)
-        return limit
+        return self.speed_limit_at(Pose.planar(x, y, frame_id=self.frame_id), full_speed)
 
     # ---------------------------------------------------------------------------------- changing and clearing
     def _replace_parameters(self, name: str, parameters: LayerParameters) -> None:

@@ -25,6 +25,16 @@ class KeepoutLayer(MeshLayer):
     Parameters = KeepoutParameters
     parameters: KeepoutParameters
 
+    def configuration_warning(self) -> str:
+        """The first region that is hardly meant as it is: a polygon that is none, or that closes nothing."""
+        mesh = self.topology
+        for index, region in enumerate(self.parameters.regions):
+            if problem := region.warning():
+                return f"regions[{index}]: {problem}"
+            if not region.closed_mask(mesh.vertices, mesh.edges, mesh.faces).any():
+                return f"regions[{index}]: there is no ground in it, at its heights"
+        return ""
+
     @classmethod
     def reach(cls, parameters: KeepoutParameters) -> float:
         """0: the edges and faces at a vertex are all it looks at."""

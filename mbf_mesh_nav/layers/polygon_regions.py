@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
-from mbf_abstract.geometry.polygon import inside_polygon
+from mbf_abstract.geometry.polygon import area_warning, inside_polygon
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.map.layer import LethalArray
@@ -36,6 +36,10 @@ class Region(ParameterModel):
         if self.z_min > self.z_max:
             raise ValueError(f"a range of heights: z_min {self.z_min:g} m is above z_max {self.z_max:g} m")
         return self
+
+    def warning(self) -> str:
+        """What of the polygon is hardly meant; empty if nothing is."""
+        return area_warning(np.array(self.polygon, dtype=np.float64))
 
     def mask(self, vertices: FloatArray) -> LethalArray:
         """Mask (V,) of the vertices (V, 3) inside, corners on the outline included by the even-odd rule."""

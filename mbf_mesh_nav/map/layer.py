@@ -87,6 +87,8 @@ class MeshLayer(map_layer.MapLayer):
     """Least and greatest number of inputs."""
     cacheable: ClassVar[bool] = False
     """Whether the values depend on mesh and parameters alone and are worth keeping in a file."""
+    has_costs: ClassVar[bool] = True
+    """Whether it says where to plan; without costs it is no default layer unless it is named as such."""
     unit: ClassVar[str] = ""
     """Unit of the costs, such as rad; empty = a share, or a sum of several units."""
     contract_check: ClassVar[str] = "mbf_mesh_nav.testing:check_layer"

@@ -46,7 +46,7 @@ from mbf_mesh_nav.map.layer import LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_cache import LayerCache
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.map_findings import frame_findings, header_findings, lying_findings, map_findings
-from mbf_mesh_nav.map.map_parameters import MeshMapParameters
+from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.densify import densify
 from mbf_mesh_nav.mesh.mesh_report import Finding, MeshError
@@ -103,12 +103,18 @@ def build_mesh_map(
             stated = height_error_of(file)
             plan = [replace(one, parameters=with_height_error(one.parameters, stated)) for one in plan]
         graph = compute_layers(mesh_map, plan, parameters.cache_dir)
-        default = parameters.default_layer or parameters.layers[-1].name
+        default = parameters.default_layer or last_with_costs(plan, parameters.layers)
         mesh_map.set_layers(graph, default, parameters.edge_cost_factor)
     report.findings += frame_findings(file, parameters.up_axis, parameters.unit)
     report.findings += [*header_findings(file), *map_findings(mesh_map)]
     report.findings += lying_findings(mesh_map, file, parameters.up_axis)
     return mesh_map
+
+
+def last_with_costs(plan: Sequence[PlannedLayer[MeshLayer]], listed: Sequence[MeshLayerEntry]) -> str:
+    """Name of the last listed layer that has costs, of the last one if none has."""
+    without = {planned.entry.name for planned in plan if not planned.layer_class.has_costs}
+    return next((one.name for one in reversed(listed) if one.name not in without), listed[-1].name)
 
 
 def height_error_of(file: str) -> float:

@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.maps.view import FloorMap, FloorWindow
+from mbf_abstract.maps.view import GREATEST_RESOLUTION, LEAST_RESOLUTION, FloorMap, FloorWindow
 from mbf_ros.messages.geometry import InvalidValueError, MessageContext, pose_of
 from mbf_ros.messages.interfaces import Message
-
-LEAST_RESOLUTION, GREATEST_RESOLUTION = 1e-4, 1e3  # m, those of map files
 
 
 def floor_of(message: Message, context: MessageContext) -> FloorMap:

@@ -13,7 +13,7 @@ from mbf_abstract.geometry import FloatArray
 from terrain.description.description import RobotDescription
 from terrain.description.masses import mass_of, notes_on_masses, some_of
 from terrain.description.mesh_files import find_file, missing_text
-from terrain.description.outline import Corner, convex_outline, with_few_corners
+from terrain.description.outline import Corner, convex_outline, surrounds_base, with_few_corners
 from terrain.description.parameters import UrdfRobot
 from terrain.description.running_gear import RunningGear, note_on_its_side, sides_of, solids_of
 from terrain.description.solids import Placed
@@ -137,8 +137,10 @@ class _Describer:
         if len(outline) < 3:
             got = "none" if not outline else f"{len(outline)} points"
             raise self._refuse("footprint_heights", f"collision shapes between {low:g} and {high:g} m", got)
-        few = with_few_corners(outline, self.stated.footprint_corners)
-        return [(_rounded(x), _rounded(y)) for x, y in few]
+        few = [(_rounded(x), _rounded(y)) for x, y in with_few_corners(outline, self.stated.footprint_corners)]
+        if not surrounds_base(few):
+            self.notes.append("base_link lies outside of its footprint, which a costmap refuses; state footprint")
+        return few
 
     def _wheelbase(self) -> float:
         xs = [float(wheel.centre[0]) for wheel in self.gear.wheels]
@@ -214,6 +216,9 @@ class _Describer:
             self.notes.append("it stands on one line: it has to balance, and on which slopes it tips over is not known")
         elif found.least <= 0.0:
             self.notes.append("its centre of mass is not above its wheels and casters: it tips over on level ground")
+        elif found.least <= (margin := self.stated.tip_over_margin):
+            text = f"it tips over at {math.degrees(found.least):.0f} degrees, which is less than tip_over_margin"
+            self.notes.append(f"{text}, {math.degrees(margin):.0f} degrees: no slope is planned for in that direction")
         return found
 
     def _edges(self, body: list[Placed]) -> Edges | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -96,6 +97,12 @@ def edge_distance(outline: list[Corner], point: Corner) -> float:
 def as_array(outline: list[Corner]) -> FloatArray:
     """Corners as (n, 2) float64 [m]."""
     return np.array(outline, dtype=np.float64).reshape(-1, 2)
+
+
+def surrounds_base(outline: Sequence[Corner]) -> bool:
+    """Whether ``base_link`` lies in a convex outline, counter-clockwise, or on a side of it."""
+    ends = [*outline[1:], outline[0]]
+    return all(ax * by - ay * bx >= 0.0 for (ax, ay), (bx, by) in zip(outline, ends, strict=True))
 
 
 def footprint_radii(footprint: list[Corner]) -> tuple[float, float]:

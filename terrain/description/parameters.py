@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from pydantic import field_validator, model_validator
 
 from mbf_abstract.parameters import ParameterModel, parameter
+from terrain.description.outline import surrounds_base
 
 DriveName = Literal["differential", "skid", "ackermann", "omni", "tracked", "legged"]
 Corners = tuple[tuple[float, float], ...]
@@ -62,8 +64,10 @@ class UrdfRobot(ParameterModel):
             (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
             for a, b, c in zip(value, ahead, beyond, strict=True)
         ]
-        if len(value) < 3 or min(turns) <= 0.0:
+        if len(value) < 3 or min(turns) <= 0.0 or not _goes_around_once(value):
             raise ValueError("auto, or at least three corners of a convex outline, counter-clockwise")
+        if not surrounds_base(value):
+            raise ValueError("auto, or an outline around base_link, (0, 0), which lies outside of it")
         return value
 
     @field_validator("center_of_mass")
@@ -78,3 +82,13 @@ class UrdfRobot(ParameterModel):
         if self.footprint_heights[0] >= self.footprint_heights[1]:
             raise ValueError("footprint_heights: the lower height first")
         return self
+
+
+def _goes_around_once(corners: Corners) -> bool:
+    """Whether an outline that turns left at every corner turns once in all; a star of five points turns twice."""
+    ends = [*corners[1:], corners[0]]
+    headings = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in zip(corners, ends, strict=True)]
+    turned = sum(
+        (after - before) % math.tau for before, after in zip(headings, [*headings[1:], headings[0]], strict=True)
+    )
+    return turned < 1.5 * math.tau

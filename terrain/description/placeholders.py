@@ -50,7 +50,7 @@ def _of_a_standing_robot(robot: RobotDescription) -> dict[str, str]:
     def limit(*slopes: float) -> str:
         return _text(max(0.0, min(stated.max_slope, *(slope - stated.tip_over_margin for slope in slopes))))
 
-    steepest = min(stated.max_slope, found.least - stated.tip_over_margin)
+    steepest = max(0.0, min(stated.max_slope, found.least - stated.tip_over_margin))
     return {
         "$ROBOT_WHEELBASE": _text(max(xs) - min(xs)),
         "$ROBOT_TRACK": _text(max(ys) - min(ys)),
@@ -60,7 +60,7 @@ def _of_a_standing_robot(robot: RobotDescription) -> dict[str, str]:
         "$ROBOT_MAX_ROLL": limit(found.left, found.right),
         "$ROBOT_MAX_PITCH_UP": limit(found.backward),
         "$ROBOT_MAX_PITCH_DOWN": limit(found.forward),
-        "$ROBOT_MAX_TILT": _text(0.5 * (steepest + found.least)),
+        "$ROBOT_MAX_TILT": _text(max(0.0, 0.5 * (steepest + found.least))),
     }
 
 

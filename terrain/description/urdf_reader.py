@@ -17,6 +17,7 @@ from mbf_abstract.geometry.arithmetic import norm
 from terrain.description.mesh_files import read_hull
 from terrain.description.solids import Box, Cylinder, Placed, Solid, Sphere, unit
 from terrain.description.urdf import Inertial, Joint, Link, Urdf, subtree, transform_of
+from terrain.description.xacro import refuse_xacro
 from terrain.description.xml_source import Element, read_xml
 
 JOINT_TYPES = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
@@ -35,6 +36,7 @@ def read_urdf(file: Path) -> Urdf:
     root = read_xml(file)
     if root.tag != "robot":
         raise ConfigError([Finding(str(file), root.line, "", "the element <robot>", f"<{root.tag}>")])
+    refuse_xacro(root, file)
     reader = _Reader(file)
     links = {link.name: link for link in map(reader.link, reader.named(root, "link"))}
     joints = {joint.name: joint for joint in map(reader.joint, reader.named(root, "joint"))}

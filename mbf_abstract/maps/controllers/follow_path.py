@@ -1,8 +1,8 @@
 """Follow a path on any map: pure pursuit that stops before an obstacle of the map.
 
 When to use: a map backend without a controller of its own. When not: to drive around obstacles (it ends with
-BLOCKED_PATH; plan again while driving), on slopes, with speed limits of layers: the controllers of the costmap and the
-mesh server do more. Before a tight place (``tight_places``) it creeps close along the path.
+BLOCKED_PATH; plan again while driving), on slopes: the controllers of the costmap and the mesh server do more.
+Before a tight place (``tight_places``) it creeps close along the path.
 Formula: pure pursuit (Coulter 1992), the arc through a point ahead on the path.
 """
 

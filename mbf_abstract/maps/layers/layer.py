@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC
 from typing import Any, ClassVar
 
+from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -76,6 +77,13 @@ class MapLayer(ABC):
         forgotten. An object that was first seen a moment ago may be MOVING here while it still is WAITING there.
         """
         return self.tracked_objects(now)
+
+    def speed_limit_at(self, pose: Pose, full_speed: float) -> float:
+        """Allowed speed [m/s] of a robot at ``pose`` in the frame of the map, at most ``full_speed``; as it is here.
+
+        ``full_speed``, which may be inf, is what a limit in percent is a share of. See ``speed_limits``.
+        """
+        return full_speed
 
     def configuration_warning(self) -> str:
         """A legal but suspicious parameter of the layer; empty if there is none."""

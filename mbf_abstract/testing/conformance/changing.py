@@ -165,7 +165,15 @@ def _break(layer: Any) -> Callable[[], None]:
     def broken(*_: Any, **__: Any) -> Any:
         raise RuntimeError("broken by the suite")
 
-    asked = {"stale_reason", "listens_to", "configuration_warning", "speed_limit", "shift", "insert_scan"}
+    asked = {
+        "stale_reason",
+        "listens_to",
+        "configuration_warning",
+        "speed_limit",
+        "speed_limit_at",
+        "shift",
+        "insert_scan",
+    }
     members = {name: getattr(type(layer), name) for name in dir(type(layer)) if not name.startswith("_")}
     methods = [name for name, member in members.items() if inspect.isfunction(member) and name not in asked]
     for name in methods:

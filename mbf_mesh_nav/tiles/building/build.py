@@ -56,6 +56,9 @@ class TileBuilder:
         self.layers = tuple(planned.entry.name for planned in self._plan)
         if not self._plan:
             raise MeshError("tiles", ["a tiled map needs at least one layer"])
+        if bare := [planned.entry.name for planned in self._plan if not planned.layer_class.has_costs]:
+            text = f"layer '{bare[0]}' has no costs that a tile could hold: list it under tiled_map of the server"
+            raise MeshError("tiles", [text])
         self._reach = reach_of(self._plan)
         self._profiles = settings.all_profiles()
         self.default_layer = settings.mesh_map.default_layer or settings.mesh_map.layers[-1].name

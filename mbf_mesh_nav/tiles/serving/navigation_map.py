@@ -134,12 +134,18 @@ class TiledNavigationMap(TileQuestions):
         self._radius, self.footprint = parameters.inscribed_radius, parameters.footprint
 
     def configuration_warnings(self) -> list[str]:
-        """One for a robot larger than the one that the layers of the tiles were computed for."""
-        built, radius = self.tiled.index.inscribed_radius, self.inscribed_radius
-        if not 0.0 < built < radius:
-            return []
-        text = f"the tiles were built for a robot with a radius of {built:g} m, this one has {radius:g} m: beside their"
-        return [f"{text} obstacles, ground that its body touches may count as free; build them for this robot"]
+        """Those of its layers, and one for a robot larger than the one that the tiles were built for."""
+        built, radius, notes = (
+            self.tiled.index.inscribed_radius,
+            self.inscribed_radius,
+            super().configuration_warnings(),
+        )
+        if 0.0 < built < radius:
+            text = f"the tiles were built for a robot with a radius of {built:g} m, this one has {radius:g} m: beside"
+            notes.append(
+                f"{text} their obstacles, ground that its body touches may count as free; build them for this one"
+            )
+        return notes
 
     def first_outside(self, positions: FloatArray) -> int:
         """The first position with no tile above or below it; a hole in a tile is not looked for."""

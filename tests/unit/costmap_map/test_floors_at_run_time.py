@@ -1,5 +1,9 @@
 """Maps of the floor that come on a topic while the server runs: the grid, the costs, and what follows for goals."""
 
+import dataclasses
+import math
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -346,3 +350,29 @@ def test_a_mesh_takes_no_floor_and_its_configuration_refuses_the_key(tmp_path):
     )
     with pytest.raises(ConfigError, match=r"mesh.yaml:2: .*map_topic"):
         read_config(file)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "error", "text"),
+    [
+        ({"resolution": 0.0}, ValueError, "FloorMap.resolution: expected 0.0001 to 1000 m, got 0.0"),
+        ({"resolution": 1e-9}, ValueError, "FloorMap.resolution: expected 0.0001 to 1000 m, got 1e-09"),
+        ({"resolution": math.nan}, ValueError, "FloorMap.resolution: expected 0.0001 to 1000 m, got nan"),
+        ({"origin_x": math.nan}, ValueError, "FloorMap.origin_x: expected a finite number, got nan"),
+        ({"yaw": math.inf}, ValueError, "FloorMap.yaw: expected a finite number, got inf"),
+        ({"occupancy": np.zeros((0, 4), np.uint8)}, ValueError, "got the shape (0, 4)"),
+        ({"occupancy": np.zeros(4, np.uint8)}, ValueError, "got the shape (4,)"),
+        ({"occupancy": np.full((2, 2), -1, np.int8)}, TypeError, "got an array of int8"),
+        ({"occupancy": [[0, 100]]}, TypeError, "got list"),
+    ],
+)
+def test_a_floor_that_is_none_is_refused_where_it_is_made(wrong, error, text):
+    with pytest.raises(error, match=re.escape(text)):
+        dataclasses.replace(floor(), **wrong)
+
+
+def test_what_is_no_floor_is_refused_and_the_last_one_stays(site):
+    come(site, floor())
+    with pytest.raises(TypeError, match="take_floor: expected a FloorMap or a FloorWindow, got NoneType"):
+        site.server.take_floor("/map", None)
+    assert site.get_path(site.ground_pose(2.0, 0.0)).success

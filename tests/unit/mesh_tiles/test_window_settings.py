@@ -80,3 +80,16 @@ def test_a_map_without_layers_of_its_own_has_nothing_to_clear_and_is_never_stale
         server = serve(session, tmp_path, config(tiled_hills))
         assert server.tiled_map.clear() == [] and not server.map_problem() and not server.tiled_map.senses
         assert tuple(server.tiled_map.layers) == server.tiled_map.tiled.index.layers
+
+
+def test_a_layer_without_costs_limits_speed_in_the_window_and_hides_no_obstacle(tiled_hills):
+    slow = MeshLayerEntry(name="slow", type="mbf_mesh_nav.layers.speed_limit:SpeedLimitLayer")
+    everywhere = [[-1000.0, -1000.0], [1000.0, -1000.0], [1000.0, 1000.0], [-1000.0, 1000.0]]
+    blocks = {"slow": {"regions": [{"polygon": everywhere, "speed_limit": 0.2}]}}
+    tiled = TiledMap(tiled_hills)
+    for entries in ((slow,), (*ENTRIES, slow)):
+        settings = window_settings(tiled, SIDE, entries, {**SENSING, **blocks} if len(entries) > 1 else blocks)
+        shown = next(planned for planned in settings.planned if planned.entry.name == SHOWN)
+        assert "slow" not in shown.entry.inputs and set(shown.entry.inputs) <= {"safe", ENTRIES[-1].name}
+        over = TiledNavigationMap(tiled, window=settings)
+        assert over.speed_limit_at(Pose.planar(1.0, 1.0), 1.0) == 0.2

@@ -1,6 +1,7 @@
 """What is found in a URDF: numbers of robots made by hand, of those that ship, and of some that others made."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from mbf_abstract.config.findings import ConfigError
 from terrain.description.describe import describe
 from terrain.description.outline import footprint_radii
 from terrain.description.parameters import UrdfRobot
+from terrain.description.placeholders import robot_values
 from terrain.physics.robot_models import CAR, HUSKY, TURTLEBOT
 from tests.unit.robots.conftest import (
     BODY,
@@ -234,3 +236,29 @@ def test_three_wheels_in_a_star_move_any_way():
 def test_wheels_that_roll_sideways_are_an_error_that_names_them():
     with pytest.raises(ConfigError, match=r"right_front_wheel_joint: axis: expected an axis along y"):
         describe(package_file("r2d2.urdf"))
+
+
+def test_a_robot_that_hardly_stands_is_told_and_no_limit_of_it_is_below_zero(described):
+    found = described(robot(BODY, *FOUR_WHEELS), center_of_mass=(-0.298, 0.0, 0.2))
+    assert any("it tips over at 1 degrees, which is less than tip_over_margin, 9 degrees" in one for one in found.notes)
+    values = robot_values(found)
+    assert float(values["$ROBOT_MAX_PITCH_UP"]) == 0.0
+    assert 0.0 < float(values["$ROBOT_MAX_TILT"]) < found.tipping.least
+
+
+@pytest.mark.parametrize(
+    ("footprint", "text"),
+    [
+        ([[1, 1], [1, -1], [2, 0]], "an outline around base_link, (0, 0), which lies outside of it"),
+        ([[0, 1], [-0.6, -0.8], [1, 0.3], [-1, 0.3], [0.6, -0.8]], "three corners of a convex outline"),  # a star
+    ],
+)
+def test_an_outline_that_a_costmap_refuses_is_refused(described, footprint, text):
+    with pytest.raises(ValueError, match=re.escape(text)):
+        described(robot(BODY, *FOUR_WHEELS), footprint=footprint)
+
+
+def test_a_body_beside_its_base_link_is_told(described):
+    aside = '<origin xyz="2 0 0.1"/><geometry><box size="1 0.4 0.8"/></geometry>'
+    notes = described(robot(link("body", 6.0, aside), *FOUR_WHEELS), footprint_heights=(0.45, 1.0)).notes
+    assert any("base_link lies outside of its footprint" in note for note in notes)

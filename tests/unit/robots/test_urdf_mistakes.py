@@ -18,6 +18,10 @@ MISTAKES = {
     "no limit": (joint("j", "body", "x", "0 0 0", "revolute") + link("x"), "joint j: limit: expected an element"),
     "zero axis": (joint("j", "body", "x", "0 0 0", axis="0 0 0") + link("x"), "joint j: axis: expected a direction"),
     "nan": (joint("j", "body", "x", "0 nan 0", "fixed") + link("x", 1.0, BOX), "expected 3 finite numbers"),
+    "macro": (
+        "<xacro:property name='w' value='0.3'/>" + link("x", 1.0, BOX),
+        "expected a URDF without xacro (expand it: xacro FILE > robot.urdf), got <xacro:property>",
+    ),
     "xacro": (joint("j", "body", "x", "${a} 0 0", "fixed") + link("x", 1.0, BOX), "got '${a} 0 0'"),
     "negative mass": (
         link("x", -1.0) + joint("j", "body", "x", "0 0 0", "fixed"),

@@ -96,19 +96,30 @@ def window_settings(
     built = AS_BUILT.format(profile_layer) if profile_layer in live else profile_layer
     kept = [name for name in tiled.index.layers if name not in live]
     stored = [MeshLayerEntry(name=name, type=STORED) for name in dict.fromkeys([*kept, built])]
-    default = default_layer or entries[-1].name
-    shown = MeshLayerEntry(name=SHOWN, type="max_combination", inputs=(built, default))
     load = load_layer or layer_loader("mesh", MeshLayer)
+    default = default_layer or _last_with_costs(entries, load) or built
+    shown = MeshLayerEntry(name=SHOWN, type="max_combination", inputs=tuple(dict.fromkeys((built, default))))
     parameters = MeshMapParameters(
         layers=(*stored, *entries, shown), default_layer=default, inscribed_radius=inscribed_radius
     )
     plan = plan_mesh_layers(parameters, blocks or {}, lambda name: OWN_TYPES.get(name) or load(name))
     findings = [*_senseless(plan, live), *_forgetful(plan), *_too_wide(plan, side)]
-    if default not in live:
+    if default_layer and default not in live:
         findings.append(f"default_layer {default!r}: expected one of the listed layers, {', '.join(sorted(live))}")
     if findings:
         raise LayerListError("; ".join(findings))
     return WindowSettings(side, tuple(plan), live, reach_of(plan), driven)
+
+
+def _last_with_costs(entries: Sequence[MeshLayerEntry], load: LayerLoader) -> str:
+    """Name of the last layer that has costs; empty if none has, or its type does not load."""
+    for entry in reversed(entries):
+        try:
+            if load(entry.type).has_costs:
+                return entry.name
+        except Exception:  # the plan of the layers reports it
+            return entry.name
+    return ""
 
 
 def _senseless(plan: Sequence[PlannedLayer[MeshLayer]], live: frozenset[str]) -> list[str]:
@@ -116,7 +127,7 @@ def _senseless(plan: Sequence[PlannedLayer[MeshLayer]], live: frozenset[str]) ->
     sensing: set[str] = set()
     for planned in plan:  # inputs first
         senses = planned.layer_class.insert_scan is not MeshLayer.insert_scan
-        if senses or not sensing.isdisjoint(planned.entry.reads):
+        if senses or not planned.layer_class.has_costs or not sensing.isdisjoint(planned.entry.reads):
             sensing.add(planned.entry.name)
     return [
         f"layer {name!r} takes no scans and reads no layer that does, so its values are those of the tiles: build them "
