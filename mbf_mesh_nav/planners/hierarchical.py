@@ -139,7 +139,8 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         for name, pose in named_poses(request):
             place = place_on_tiles(self._tiled, name, pose.position, self.parameters.max_surface_distance)
             if isinstance(place, TiledPlan):
-                return places, PlanResult(place.outcome, self._explained(place, name, pose, moment))
+                problem = PlanResult(place.outcome, self._explained(place, name, pose, moment))
+                return places, self._as_permanent(problem)
             places.append(place)
         return places, None
 
@@ -169,8 +170,12 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
 
     def _failed(self, plan: TiledPlan) -> PlanResult:
         """Of a plan that failed; on a map that no sensor changes, planning again does not help."""
-        permanent = plan.outcome == GetPathOutcome.NO_PATH_FOUND and not self._map.senses
-        return PlanResult(plan.outcome, plan.message, permanent=permanent)
+        return self._as_permanent(PlanResult(plan.outcome, plan.message))
+
+    def _as_permanent(self, problem: PlanResult) -> PlanResult:
+        """A failure that stays on a map that no sensor changes: no way, or a goal that is blocked."""
+        stays = problem.outcome in (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_GOAL)
+        return replace(problem, permanent=problem.permanent or (stays and not self._map.senses))
 
     def _limited(self, problem: PlanResult | None, request: PlanRequest) -> PlanResult | None:
         """A problem for which no place near the goal helps, with the limit of the tolerance if that was the cause."""

@@ -37,6 +37,7 @@ from mbf_mesh_nav.plugins import MeshContext, MeshPlanner
 from mbf_mesh_nav.search.blocked_vertices import BlockedVertices
 from mbf_mesh_nav.search.heading_check import HeadingCheck
 from mbf_mesh_nav.search.leg_search import Leg, LegQuery, propagate_from
+from mbf_mesh_nav.search.permanent_walls import as_permanent
 
 SAME_POINT = 1e-6
 """Points of a path so near [m] to each other are one."""
@@ -105,7 +106,7 @@ class SurfacePlanner(MeshPlanner):
         # 2. Where on the surface is everything? A tolerance helps with a problem of the goal only.
         stops, problem = self._locate_stops(request, snapshot, blocked)
         if problem is not None and (len(stops) <= len(request.via) or request.dist_tolerance <= 0.0):
-            return problem
+            return as_permanent(problem, self.mesh_map, request, len(stops))
 
         # 3. Plan leg by leg; the last one may end near the goal instead of at it.
         legs: list[Leg] = []
@@ -127,7 +128,8 @@ class SurfacePlanner(MeshPlanner):
         if request.cancel_token.cancelled:
             return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
         if problem is not None:
-            return not_even_beside(problem, request.dist_tolerance) if near_goal else problem
+            judged = as_permanent(problem, self.mesh_map, request, len(legs) + 1)
+            return not_even_beside(judged, request.dist_tolerance) if near_goal else judged
         path = path_of_legs(legs, request.goal, not near_goal, self.mesh_map.frame_id, self.clock.now())
         notes = [leg.note for leg in legs if leg.note]
         if near_goal:

@@ -1,0 +1,98 @@
+"""Whether a goal on a mesh is permanently unreachable: separated by ground that no sensor can open.
+
+On the map of the moment a wall and a movable box look the same. So the search is repeated with what is lethal in layers
+that depend on the mesh and their parameters alone: where even that leaves no way, waiting and trying again are useless.
+Inflated ground is left out, as ``relax`` makes it smaller.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PlanRequest, PlanResult
+from mbf_mesh_nav.arrays import BoolArray, IntArray
+from mbf_mesh_nav.layers.combinations.combination import CombinationLayer
+from mbf_mesh_nav.layers.inflation import InflationLayer
+from mbf_mesh_nav.map.layer import MeshLayer
+from mbf_mesh_nav.map.mesh_map import MeshMap
+
+
+def as_permanent(problem: PlanResult, mesh_map: MeshMap, request: PlanRequest, index: int) -> PlanResult:
+    """A failure of the way to via pose ``index``, counted from 1, or to the goal behind the last of them.
+
+    It is permanent where such ground separates the pose from the start. A tolerance is that of the goal.
+    """
+    if problem.permanent or problem.outcome not in (GetPathOutcome.BLOCKED_GOAL, GetPathOutcome.NO_PATH_FOUND):
+        return problem
+    is_last = index > len(request.via)
+    goal = request.goal if is_last else (request.start, *request.via)[index]
+    walls = what_separates(mesh_map, request.start, goal, request.dist_tolerance if is_last else 0.0)
+    text = f"{problem.message}; lethal ground of {', '.join(walls)} separates them"
+    return replace(problem, message=text, permanent=True) if walls else problem
+
+
+def what_separates(mesh_map: MeshMap, start: Pose, goal: Pose, tolerance: float) -> tuple[str, ...]:
+    """Names of the layers whose permanent ground separates a start from all vertices near a goal; empty if none does.
+
+    Near are the corners of the goal's face and what lies within ``tolerance`` [m] of it. The answer is conservative: it
+    is empty for a start on such ground, for poses off the surface, and wherever other ground might be opened.
+    """
+    walls = permanent_layers(mesh_map)
+    closed = np.zeros(mesh_map.topology.vertex_count, dtype=np.bool_)
+    for layer in walls:
+        closed |= layer.lethal
+    ends = mesh_map.locate([start.position, goal.position], np.inf).faces
+    if (ends < 0).any() or not closed.any():
+        return ()
+    first, last = (mesh_map.faces[face] for face in ends)
+    if closed[first].any():
+        return ()
+    pieces = _pieces(mesh_map.topology.edges, closed)
+    near = norm(mesh_map.vertices - np.asarray(goal.position)) <= tolerance
+    near[last] = True
+    reached = np.isin(pieces, pieces[first]) & ~closed
+    if (near & reached).any():
+        return ()
+    merged = [layer.name for layer in walls if not isinstance(layer, CombinationLayer) and layer.lethal.any()]
+    return tuple(sorted(merged) or [layer.name for layer in walls])
+
+
+def permanent_layers(mesh_map: MeshMap) -> list[MeshLayer]:
+    """The layers that no sensor changes, neither directly nor by their inputs, and whose lethal ground the map has.
+
+    Such are the default layer and those that reach it through combinations and inflations, which keep what is lethal.
+    """
+    if mesh_map.default_layer is None:
+        return []
+    found: dict[str, MeshLayer] = {}
+    todo = [mesh_map.layers[mesh_map.default_layer]]
+    while todo:
+        layer = todo.pop()
+        if isinstance(layer, CombinationLayer | InflationLayer):
+            todo += [read for read in layer.inputs if read.parameters.enabled]
+        if layer.parameters.enabled and _is_fixed(layer):
+            found[layer.name] = layer
+    return list(found.values())
+
+
+def _is_fixed(layer: MeshLayer) -> bool:
+    """Whether neither a sensor nor time nor an inflated input changes a layer."""
+    kind = type(layer)
+    changes = kind.insert_scan is not MeshLayer.insert_scan or kind.update is not MeshLayer.update
+    return not changes and not isinstance(layer, InflationLayer) and all(_is_fixed(read) for read in layer.inputs)
+
+
+def _pieces(edges: IntArray, closed: BoolArray) -> IntArray:
+    """Numbers (V,) of the connected pieces of the ground that is not closed."""
+    from scipy import sparse  # takes long to import, and most plans are found
+    from scipy.sparse import csgraph
+
+    kept = edges[~closed[edges].any(axis=1)]
+    shape = (len(closed), len(closed))
+    graph = sparse.coo_matrix((np.ones(len(kept), dtype=np.bool_), (kept[:, 0], kept[:, 1])), shape=shape)
+    return np.asarray(csgraph.connected_components(graph, directed=False)[1])
