@@ -29,9 +29,9 @@ from collections.abc import Callable, Iterable
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.maps.layers.obeyed_limits import slow_motion
 from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.navigation_map import NavigationMap
-from mbf_abstract.maps.speed_limits import slow_motion
 from mbf_abstract.maps.tracking.contact_guard import slower
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter

@@ -18,11 +18,11 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.avoided_places import AvoidedPlace
+from mbf_abstract.maps.layers.obeyed_limits import within_speed_limit
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.scan_intake import ScanIntake
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.served_map import ServedMap
-from mbf_abstract.maps.speed_limits import within_speed_limit
 from mbf_abstract.maps.tracking.contact_guard import ContactGuard
 from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_abstract.outcomes import ExePathOutcome

@@ -5,7 +5,8 @@ cells at all; one look-up per question. Known failure: the limit applies from th
 so draw an area with the distance the robot needs to brake.
 
 It writes no costs; ``LayeredCostmap.speed_limit`` queries it, and whatever drives is slowed down, see
-``mbf_abstract.maps.speed_limits``. A limit of 0 m/s is none that can be driven at: paths through it are blocked.
+``mbf_abstract.maps.layers.obeyed_limits``. A limit of 0 m/s is none that can be driven at: paths through it are
+blocked.
 
 A zone's ``speed_limit`` is a speed [m/s], or a share of the full speed [%] with ``limit_type: percent``. In a mask,
 limit = ``base`` + ``multiplier`` * occupancy (0..100); free and unknown mask cells set no limit (Nav2's speed filter).

@@ -17,8 +17,7 @@ from mbf_abstract.geometry.arithmetic import norm
 from terrain.description.mesh_files import read_hull
 from terrain.description.solids import Box, Cylinder, Placed, Solid, Sphere, unit
 from terrain.description.urdf import Inertial, Joint, Link, Urdf, subtree, transform_of
-from terrain.description.xacro import refuse_xacro
-from terrain.description.xml_source import Element, read_xml
+from terrain.description.xml_source import Element, read_xml, refuse_xacro
 
 JOINT_TYPES = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")

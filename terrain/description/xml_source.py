@@ -111,3 +111,17 @@ class _Builder:
 
     def _refuse_entity(self, name: str, *rest: object) -> None:
         raise _Refused("no entities of its own", f"the entity {name!r}")
+
+
+def refuse_xacro(root: Element, file: Path) -> None:
+    """Raise ConfigError where a file has elements of xacro, which stand for others."""
+    for element in _all(root):
+        if element.tag.startswith("xacro:"):
+            expected = "a URDF without xacro (expand it: xacro FILE > robot.urdf)"
+            raise ConfigError([Finding(str(file), element.line, "", expected, f"<{element.tag}>")])
+
+
+def _all(element: Element) -> Iterator[Element]:
+    yield element
+    for child in element.children:
+        yield from _all(child)

@@ -36,6 +36,7 @@ from mbf_mesh_nav.tiles.tiled_map import TiledMap
 PLACES_A_TILE = 8.0
 """Places per length of a tile at which lines between poses are looked up."""
 NO_WINDOW = "the map of tiles has no window around the robot"
+LARGE_ROBOT = "tiles built for a robot with a radius of {:g} m, this one has {:g} m: what it touches may count as free"
 NO_VIEW = GridView(np.zeros((0, 0), dtype=np.float32), (0.0,) * 4)
 CANCEL_PERIOD = 0.05
 """How often [s] a goal that waits for the search of another one looks whether it is cancelled."""
@@ -135,17 +136,9 @@ class TiledNavigationMap(TileQuestions):
 
     def configuration_warnings(self) -> list[str]:
         """Those of its layers, and one for a robot larger than the one that the tiles were built for."""
-        built, radius, notes = (
-            self.tiled.index.inscribed_radius,
-            self.inscribed_radius,
-            super().configuration_warnings(),
-        )
-        if 0.0 < built < radius:
-            text = f"the tiles were built for a robot with a radius of {built:g} m, this one has {radius:g} m: beside"
-            notes.append(
-                f"{text} their obstacles, ground that its body touches may count as free; build them for this one"
-            )
-        return notes
+        built, radius = self.tiled.index.inscribed_radius, self.inscribed_radius
+        large = LARGE_ROBOT.format(built, radius) if 0.0 < built < radius else ""
+        return [*super().configuration_warnings(), *filter(None, [large])]
 
     def first_outside(self, positions: FloatArray) -> int:
         """The first position with no tile above or below it; a hole in a tile is not looked for."""
