@@ -178,6 +178,8 @@ class Action(ABC, Generic[G, R, F]):
         self._closed = False
         self.listeners: list[Callable[[GoalHandle[G, R, F]], None]] = []
         """Called with every goal that has ended, on the thread that ended it: must be short and must not raise."""
+        self.accept_listeners: list[Callable[[GoalHandle[G, R, F]], None]] = []
+        """Called with every goal that is accepted, before it begins, on the sender's thread; as ``listeners``."""
 
     # ------------------------------------------------------------------------------------------ client
     def send(self, goal: G, on_done: Callable[[GoalHandle[G, R, F]], None] | None = None) -> GoalHandle[G, R, F]:
@@ -197,6 +199,8 @@ class Action(ABC, Generic[G, R, F]):
         )
         with self._condition:
             self._unfinished[handle.id] = handle
+        for listener in self.accept_listeners:
+            listener(handle)
         self._dispatch(GoalJob(self, handle, slot))
         return handle
 

@@ -140,6 +140,11 @@ class NavigationParameters(ParameterModel):
         gt=0.0,
         le=5.0,
     )
+    idle_makes_room: bool = parameter(
+        True,
+        "Whether a robot without a goal, which has loaded the behaviour for the right of way and announces itself, "
+        "pulls out for a robot that is blocked by it and asks, and drives back afterwards.",
+    )
 
     # Robot, frames and odometry
     global_frame: str = parameter("map", "Frame of goals and paths.", dynamic=False)

@@ -34,8 +34,7 @@ class Lease:
 
     def __init__(self, gate: VelocityGate, owner: str) -> None:
         self._gate = gate
-        self._condition = gate._condition
-        self._writer = gate._writer
+        self._condition, self._writer = gate._condition, gate._writer
         self.owner = owner
         self.paused = False
         self.problem = ""
@@ -102,10 +101,7 @@ class Lease:
 
     def revoke(self, reason: str) -> None:
         """Take the right away from its owner and have the watchdog send zero at once; never waits."""
-        with self._condition:
-            if self.active:
-                self._gate._end_lease(reason)
-                self._gate._wake_watchdog(reason)
+        self._gate.revoke(reason, self)
 
     def _reason_to_drop(self) -> str:
         if not self.active:
@@ -130,8 +126,7 @@ class VelocityGate:
     def __init__(
         self, robot: Robot, clock: Clock, events: EventBus, limits: VelocityLimits, command_timeout: float
     ) -> None:
-        self._clock = clock
-        self._events = events
+        self._clock, self._events = clock, events
         self.limits = limits
         self._command_timeout = command_timeout
         self._condition = clock.condition()
@@ -139,8 +134,7 @@ class VelocityGate:
         self._lease: Lease | None = None
         self._stop_asked = ""  # the reason
         self._tried_at = -math.inf
-        self._closed = False
-        self._closing_tries = CLOSING_TRIES
+        self._closed, self._closing_tries = False, CLOSING_TRIES
         self._spawn_watchdog()
 
     @property
@@ -185,6 +179,13 @@ class VelocityGate:
             if not self._writer.stands:
                 self._wake_watchdog(reason)
 
+    def revoke(self, reason: str, lease: Lease | None = None) -> None:
+        """End this lease, or whatever lease there is, and have the watchdog send zero at once; never waits."""
+        with self._condition:
+            if self._lease is not None and lease in (None, self._lease):
+                self._end_lease(reason)
+                self._wake_watchdog(reason)
+
     def close(self, reason: str = "server shut down") -> None:
         """Stop the robot for good: revoke the lease, refuse new ones, end the watchdog. Idempotent.
 
@@ -194,8 +195,7 @@ class VelocityGate:
             if self._closed:
                 return
             self._closed = True
-            owner = self.holder
-            self._lease = None
+            owner, self._lease = self.holder, None
             self._events.emit(EventKind.GATE_CLOSED, "velocity_gate", holder=owner, reason=reason)
             stop = self._writer.begin_stop()
             self._condition.notify_all()

@@ -132,8 +132,13 @@ def paths_to_keep_free(begin: Pose, track: FloatArray, paths: Sequence[FloatArra
     behind = behind[driven <= length]
     older = behind[norm(behind - behind[-1]) > PATH_SPACING]
     back = behind[-1] - older[-1] if len(older) else np.array([-1.0, 0.0])
-    others = [_on_storey(begin, path) for path in paths]
-    return np.concatenate([on * (1.0, 0.0), behind, behind[-1] + on * back / norm(back), *others])
+    others = paths_on_storey(begin, paths)
+    return np.concatenate([on * (1.0, 0.0), behind, behind[-1] + on * back / norm(back), others])
+
+
+def paths_on_storey(begin: Pose, paths: Sequence[FloatArray]) -> FloatArray:
+    """Points (n, 2) [m] in the plane of a robot at ``begin``, of those of paths (m, 3) that are on its storey."""
+    return np.concatenate([np.zeros((0, 2)), *(_on_storey(begin, path) for path in paths)])
 
 
 def in_plane_of(begin: Pose, other: Pose, points: FloatArray) -> FloatArray:

@@ -17,6 +17,7 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.execution.plan_check import path_in_global_frame
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.server.making_room import MakingRoom
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.traffic import Channel
@@ -32,6 +33,8 @@ DIGITS = 2
 class Announcer:
     """Publishes for one server: the path that ``exe_path`` follows, and in recoveries the one that it has followed.
 
+    A robot without a goal also makes room for others that ask, see ``making_room``.
+
     Parameters
     ----------
     server : AbstractNavigationServer
@@ -46,6 +49,7 @@ class Announcer:
         self._tracker: PathTracker | None = None
         self._busy = -math.inf
         server.runtime.traffic.connect(name, channel)
+        self._making_room = MakingRoom(server)
 
     def announce(self) -> None:
         """Publish the present state; does nothing while the robot does not know where it is."""
@@ -53,9 +57,10 @@ class Announcer:
         now = runtime.clock.now()
         self._take_path(now)
         try:
-            position = runtime.robot.pose().position
+            pose = runtime.robot.pose()
         except RobotStateError:
             return
+        position = pose.position
         path, remaining, destination = np.array([position]), 0.0, None
         if self._tracker is not None:
             self._tracker.update(position)
@@ -63,7 +68,8 @@ class Announcer:
             remaining = float(norm(path[1] - path[0])) + self._tracker.remaining
             destination = self._tracker.points[-1]
         state = Announcement("", now, path, round(remaining, DIGITS), radius=self._server.robot_radius)
-        runtime.traffic.announce(state, destination)
+        runtime.traffic.announce(self._making_room.announced(state), destination)
+        self._making_room.act(pose)
 
     def _take_path(self, now: float) -> None:
         """Keep up with the newest goal of ``exe_path``; without goals that drive, forget its path after a while."""

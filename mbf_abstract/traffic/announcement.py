@@ -35,6 +35,10 @@ class Announcement:
         How often it has waited in vain for others to let it pass, since it has met them.
     radius : float
         Of a circle [m] around its place that holds all of the robot; 0 = not known.
+    makes_room : bool
+        Whether it has no goal and pulls out for a robot that asks; see ``server.making_room``.
+    asks : bool
+        Whether it is blocked and waits for those that make room near its path.
     """
 
     name: str
@@ -44,6 +48,8 @@ class Announcement:
     cannot_yield: bool = False
     waits: int = 0
     radius: float = 0.0
+    makes_room: bool = False
+    asks: bool = False
 
     def to_json(self) -> str:
         """Return it as a JSON object, to be sent; ``from_json`` reads it."""
@@ -64,6 +70,8 @@ class Announcement:
                 bool(values["cannot_yield"]),
                 int(values["waits"]),
                 float(values["radius"]),
+                bool(values.get("makes_room", False)),  # robots with an older version do not send these two
+                bool(values.get("asks", False)),
             )
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise ValueError(f"no announcement of a robot: {type(error).__name__}: {error}") from error

@@ -2,9 +2,10 @@
 
 First goes the one that cannot yield; of two that can, or two that cannot, the one that has waited in vain less often;
 of two that have waited equally often, the one with the shorter path to its goal; of two equally long paths, that of the
-robot whose name comes first. The ranks of all robots are in one order, so of any number of robots whose paths conflict
-exactly one may go before all others, and they never wait for each other in a circle. The rule of the road, right before
-left, would let four robots at a crossing wait for ever.
+robot whose name comes first. One that stands without a goal and makes room comes after all of these. The ranks of all
+robots are in one order, so of any number of robots whose paths conflict exactly one may go before all others, and they
+never wait for each other in a circle. The rule of the road, right before left, would let four robots at a crossing wait
+for ever.
 
 While robots meet, each announces the length that was left when they met. So the decision lasts, also where the one that
 yields drives forward, or the other one plans a detour. Only a wait in vain, or a robot that cannot yield, changes it.
@@ -33,8 +34,8 @@ def right_of_way(mine: Announcement, other: Announcement) -> bool:
     return _rank(mine) < _rank(other)
 
 
-def _rank(robot: Announcement) -> tuple[bool, int, float, str]:
-    return not robot.cannot_yield, robot.waits, robot.remaining, robot.name
+def _rank(robot: Announcement) -> tuple[bool, bool, int, float, str]:
+    return robot.makes_room, not robot.cannot_yield, robot.waits, robot.remaining, robot.name
 
 
 def paths_conflict(mine: Announcement, other: Announcement, distance: float, length: float) -> bool:
@@ -54,6 +55,16 @@ def face_each_other(mine: Announcement, other: Announcement, length: float) -> b
     others pass, only its place counts.
     """
     return _is_ahead(other, mine, length) and (len(other.path) == 1 or _is_ahead(mine, other, length))
+
+
+def stands_in_the_way(standing: Announcement, traveller: Announcement, distance: float) -> bool:
+    """Whether a robot without a goal stands ahead of another, nearer to its path than ``distance`` [m].
+
+    Both compute it: the traveller, to know whom it may wait for, and the one that stands, to know that it is asked.
+    How far the traveller looks is ``MEETING_LENGTH`` for both.
+    """
+    near = paths_conflict(standing, traveller, distance, MEETING_LENGTH)
+    return near and _is_ahead(standing, traveller, MEETING_LENGTH)
 
 
 def _is_ahead(robot: Announcement, traveller: Announcement, length: float) -> bool:

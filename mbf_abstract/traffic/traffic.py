@@ -15,7 +15,7 @@ from typing import Protocol
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.traffic.announcement import Announcement
-from mbf_abstract.traffic.right_of_way import face_each_other, paths_conflict
+from mbf_abstract.traffic.right_of_way import face_each_other, paths_conflict, stands_in_the_way
 
 MAX_AGE = 3.0
 """A robot that announces nothing new for this long [s] does not count: it is switched off, or out of reach."""
@@ -100,11 +100,14 @@ class Traffic:
         Where the robot is and wants to go.
     yields : bool
         Whether it is letting others pass: then it announces where it is, and not where it wants to go.
+    asks : bool
+        As it is announced; see ``ask``.
     """
 
     def __init__(self) -> None:
         self.own: Announcement | None = None
         self.yields = False
+        self.asks = False
         self._name = ""
         self._channel: Channel | None = None
         self._meeting: Meeting | None = None
@@ -151,7 +154,7 @@ class Traffic:
     def _publish(self, announcement: Announcement) -> None:
         if self._channel is None:
             return
-        own, meeting = replace(announcement, name=self._name), self._meeting
+        own, meeting = replace(announcement, name=self._name, asks=self.asks), self._meeting
         if meeting is not None and own.remaining > 0.0:  # one that has arrived has nothing left
             own = replace(own, remaining=meeting.remaining, cannot_yield=meeting.cannot_yield, waits=meeting.waits)
         self.own = own
@@ -180,6 +183,12 @@ class Traffic:
             meeting.waits = 1 + max((rival.waits for rival in rivals), default=0)
             self._publish(own)
 
+    def ask(self, asks: bool) -> None:
+        """Announce whether this robot waits for those that stand in its way without a goal."""
+        self.asks, own = asks, self.own
+        if own is not None:
+            self._publish(own)
+
     def others(self, now: float) -> tuple[Announcement, ...]:
         """Return what the other robots have announced lately, in the order of their names; ``now`` [s] is own time.
 
@@ -196,9 +205,10 @@ class Traffic:
         return seen if seen is not None and seen[0] == announcement.stamp else (announcement.stamp, now)
 
     def rivals(self, now: float, distance: float, length: float) -> tuple[Announcement, ...]:
-        """Robots that go somewhere, whose path conflicts with this robot's, and that face it.
+        """Robots that go somewhere, whose path conflicts with this robot's, and that face it; those that make room.
 
-        One that follows this robot, or drives on before it, is no rival.
+        One that follows this robot, or drives on before it, is no rival. Of those without a goal the ones that stand
+        in the way and can make room are; those of a robot that makes room itself are the ones that ask it to.
 
         Parameters
         ----------
@@ -210,6 +220,13 @@ class Traffic:
         own = self.own
         if own is None:
             return ()
-        going = [other for other in self.others(now) if other.remaining > 0.0]
-        near = [other for other in going if paths_conflict(own, other, distance, length)]
-        return tuple(other for other in near if face_each_other(own, other, length))
+        return tuple(other for other in self.others(now) if _is_rival(own, other, distance, length))
+
+
+def _is_rival(own: Announcement, other: Announcement, distance: float, length: float) -> bool:
+    if own.makes_room:
+        return other.asks and stands_in_the_way(own, other, distance)
+    if other.makes_room:
+        return not other.cannot_yield and stands_in_the_way(other, own, distance)
+    meets = other.remaining > 0.0 and paths_conflict(own, other, distance, length)
+    return meets and face_each_other(own, other, length)

@@ -8,24 +8,25 @@ Its path is the track that the robot has driven, straight ahead and straight on 
 searched where the base stands ``distance`` from all of it, by the shortest manoeuvre on which the outline touches
 nothing the map knows: back into a bay, around a corner, or a step aside in a hall; see ``maps.pull_out``. Who is
 tracked near its path is taken to go beside it, and that path is kept free, too, where there is such a place. The
-manoeuvre is driven slowly, each command checked as in every recovery. Where a command is refused, the robot waits for
-``PAUSE``, in which somebody who moves there stops or passes, and searches anew, ``ATTEMPTS`` times in all; afterwards
-it stands for a time that is drawn anew for each run, or until those who were tracked on its path have left it. Where
-there is no such place it ends with IMPASSABLE at once.
+manoeuvre is driven slowly, each command checked as in every recovery, and searched anew where one is refused (see
+``pulling_out``); afterwards it stands for a time that is drawn anew for each run, or until those who were tracked on
+its path have left it. Where there is no such place it ends with IMPASSABLE at once.
 
 Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
 goes first waits until the others have left its path; the others pull out, also off the path that the first one has
 announced, and wait until it has passed. Both wait while the others move, and ``longest_wait`` longer, but not more than
 ``MOST_WAITS`` times as long in all. One that finds no place, or does not get there, announces that, and then goes
 first. One that goes first and has waited in vain announces that, too: then the others go first, and it pulls out
-itself. In the end the maps forget what they keep of places where the others stood and have left.
+itself. Robots that stand without a goal in its way are asked to pull out and waited for; run by such a robot,
+``give_way`` only pulls out (see ``server.making_room``). In the end the maps forget what they keep of places where the
+others stood and have left.
 
 The server's ``recovery_patience`` must leave time for drive and wait.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import ClassVar
@@ -33,20 +34,18 @@ from typing import ClassVar
 import numpy as np
 
 from mbf_abstract.drive.robot import RobotStateError
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
-from mbf_abstract.maps.manoeuvres import Step
-from mbf_abstract.maps.pull_out import find_pull_out, in_plane_of, paths_beside, paths_to_keep_free
-from mbf_abstract.maps.recoveries.manoeuvre_recovery import ManoeuvreParameters, ManoeuvreRecovery
+from mbf_abstract.maps.pull_out import in_plane_of, paths_beside, paths_to_keep_free
+from mbf_abstract.maps.recoveries.pulling_out import PullingOutParameters, PullingOutRecovery
 from mbf_abstract.maps.recoveries.wait import stand
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_abstract.traffic.announcement import Announcement
-from mbf_abstract.traffic.right_of_way import MEETING_LENGTH, right_of_way
+from mbf_abstract.traffic.right_of_way import right_of_way
 
-ATTEMPTS, PAUSE = 4, 2.0  # to drive to a place; s between two of them
 WAIT_PERIOD = 0.5  # s between two looks at where the other robots are
 MOVED = 0.2  # m, of another robot that does not stand
 AHEAD = 2.0  # m of its path ahead that must be clear of others before it ends its wait early
@@ -55,18 +54,9 @@ NOT_THERE = frozenset([RecoveryOutcome.IMPASSABLE, RecoveryOutcome.PAT_EXCEEDED]
 """How it ends to find no place, or not to get there."""
 
 
-class GiveWayParameters(ManoeuvreParameters):
+class GiveWayParameters(PullingOutParameters):
     """Parameters of ``give_way``."""
 
-    distance: float = parameter(
-        0.8,
-        "How far its base stands from its path, at least: half of both widths and a margin. Others meet it where their "
-        "path comes nearer.",
-        unit="m",
-        gt=0.0,
-        le=5.0,
-    )
-    reach: float = parameter(4.0, "Longest manoeuvre to such a place.", unit="m", gt=0.0, le=20.0)
     wait: float = parameter(3.0, "How long to stand there, at least.", unit="s", ge=0.0, le=600.0)
     random_extra: float = parameter(3.0, "Stand up to this much longer, by chance.", unit="s", ge=0.0, le=600.0)
     longest_wait: float = parameter(
@@ -79,7 +69,7 @@ class GiveWayParameters(ManoeuvreParameters):
     )
 
 
-class GiveWayRecovery(ManoeuvreRecovery):
+class GiveWayRecovery(PullingOutRecovery):
     """Pulls out, and waits until the other one may have passed."""
 
     Parameters: ClassVar[type[PluginParameters]] = GiveWayParameters
@@ -87,7 +77,9 @@ class GiveWayRecovery(ManoeuvreRecovery):
 
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Pull out and wait, or wait first, where the right of way is this robot's; then forget where others stood."""
-        rivals = self._rivals()
+        if self.traffic.own is not None and self.traffic.own.makes_room:
+            return self.make_room(request)
+        rivals = self.rivals()
         result = self._yield_or_wait(request, rivals)
         with suppress(RobotStateError):  # what was done is done; whoever drives next needs the pose as well
             self._forget_left_places(request.motion.pose(), rivals)
@@ -95,50 +87,32 @@ class GiveWayRecovery(ManoeuvreRecovery):
 
     def _yield_or_wait(self, request: RecoveryRequest, rivals: Sequence[Announcement]) -> RecoveryResult:
         if rivals and not self._before(rivals):
-            result = self._wait_for(request, rivals, "has the right of way over")
-            rivals = self._rivals()
+            result = self._ask_for_room(request, rivals)
+            rivals = self.rivals()
             if not (result.success and rivals):
                 return result
+            if all(rival.makes_room for rival in rivals):  # to pull out for those that go nowhere is of no use
+                return replace(result, outcome=RecoveryOutcome.IMPASSABLE)
             if not self._before(rivals):
                 self.traffic.wait_was_in_vain(rivals)
         before = self._before(rivals)
         self.traffic.yields = True
         begin = request.motion.pose()
         try:
-            result = self._pull_out(request)
+            result = self.pull_out(request, self._keep_free, "its path")
             if result.success:
                 return self._stand_aside(request, begin, before)
         finally:
             self.traffic.yields = False
         return self._without_room(request, before, result) if result.outcome in NOT_THERE else result
 
-    @property
-    def meeting_distance(self) -> float:
-        """Others meet it where their path comes nearer than this [m]."""
-        return self.parameters.distance
-
-    def _pull_out(self, request: RecoveryRequest) -> RecoveryResult:
-        """Search a place and drive there section by section; search anew where the drive there is not free."""
-        p, token = self.parameters, request.cancel_token
-        result = RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
-        course = request.motion.pose()
-        for attempt in range(ATTEMPTS):
-            if attempt:
-                paused = stand(request, PAUSE)  # somebody who moves there stops before this robot, or passes
-                if not paused.success:
-                    return paused
-            begin = request.motion.pose()
-            steps = self._manoeuvre(begin, course, request)
-            if token.cancelled:
-                return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
-            if steps is None:
-                text = f"no place {p.distance:g} m beside its path within a manoeuvre of {p.reach:g} m"
-                return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
-            self.traffic.set_cannot_yield(False)
-            result = self.drive_along(begin, steps, request)
-            if result.outcome != RecoveryOutcome.IMPASSABLE:
-                break
-        return result
+    def _ask_for_room(self, request: RecoveryRequest, rivals: Sequence[Announcement]) -> RecoveryResult:
+        """Wait for the others, and have those among them that stand without a goal pull out."""
+        self.traffic.ask(any(rival.makes_room for rival in rivals))
+        try:
+            return self._wait_for(request, rivals, "has the right of way over")
+        finally:
+            self.traffic.ask(False)
 
     def _stand_aside(self, request: RecoveryRequest, begin: Pose, before: list[Announcement]) -> RecoveryResult:
         """Wait beside the path, until the robots that go first have passed."""
@@ -176,11 +150,6 @@ class GiveWayRecovery(ManoeuvreRecovery):
         )
 
     # --------------------------------------------------------------------------------------------- the other robots
-    def _rivals(self) -> tuple[Announcement, ...]:
-        """Those that it meets; no fewer than those for which it was run as ``right_of_way_behavior``."""
-        p = self.parameters
-        return self.traffic.meet(self.clock.now(), p.distance, max(p.reach, MEETING_LENGTH))
-
     def _before(self, rivals: Sequence[Announcement]) -> list[Announcement]:
         """Those of the robots that go before this one."""
         own = self.traffic.own
@@ -195,7 +164,7 @@ class GiveWayRecovery(ManoeuvreRecovery):
             result = stand(request, WAIT_PERIOD)
             if not result.success:
                 return result
-            left = [rival for rival in self._rivals() if rival.name in names]
+            left = [rival for rival in self.rivals() if rival.name in names]
             if not left or {rival.name for rival in self._before(left)} - went_before:
                 break
             for rival in left:
@@ -212,7 +181,7 @@ class GiveWayRecovery(ManoeuvreRecovery):
             return failed
         self.traffic.set_cannot_yield(True)
         result = self._wait_for(request, before, f"{failed.message}; asks for the right of way over")
-        return replace(result, outcome=failed.outcome) if result.success and self._rivals() else result
+        return replace(result, outcome=failed.outcome) if result.success and self.rivals() else result
 
     def _forget_left_places(self, pose: Pose, rivals: Sequence[Announcement]) -> None:
         """Free what the maps keep of the bodies of robots that have left: no ray passes all of these cells."""
@@ -228,21 +197,14 @@ class GiveWayRecovery(ManoeuvreRecovery):
             one.update(self.on_map(pose, one), now)
 
     # -------------------------------------------------------------------------------------------------- the search
-    def _manoeuvre(self, begin: Pose, course: Pose, request: RecoveryRequest) -> list[Step] | None:
-        """Shortest manoeuvre in the plane of the robot at ``begin`` to a place beside its path and those of others.
+    def _keep_free(self, begin: Pose, course: Pose) -> Iterator[FloatArray]:
+        """Yield its path and those of others, in the plane of the robot at ``begin``; see ``paths_beside``.
 
         Its path leads on as the robot stood at ``course``, before it set out to a place that is not free any more.
         """
-        p, token = self.parameters, request.cancel_token
-        length = p.reach + p.distance
-        paths = [rival.points_ahead(length) for rival in self._before(self._rivals())]
-        keep_free = in_plane_of(begin, course, paths_to_keep_free(course, self.robot.recent_track(), paths, length))
-        start, turning_radius = self.on_map(begin), self.min_turning_radius
-        known = () if self._rivals() else self.navigation_map.tracked_objects(self.clock.now())
-        for free in paths_beside(start, keep_free, known, p.distance, self.navigation_map.same_storey):
-            steps = find_pull_out(
-                self.navigation_map, start, free, p.distance, p.reach, turning_radius, lambda: token.cancelled
-            )
-            if steps is not None or token.cancelled:
-                return steps
-        return None
+        length, rivals = self.parameters.reach + self.parameters.distance, self.rivals()
+        paths = [rival.points_ahead(length) for rival in self._before(rivals)]
+        own = in_plane_of(begin, course, paths_to_keep_free(course, self.robot.recent_track(), paths, length))
+        known = () if rivals else self.navigation_map.tracked_objects(self.clock.now())
+        distance, same_storey = self.parameters.distance, self.navigation_map.same_storey
+        return paths_beside(self.on_map(begin), own, known, distance, same_storey)

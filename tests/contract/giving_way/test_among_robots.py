@@ -10,7 +10,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.right_of_way import paths_conflict, right_of_way
 from mbf_abstract.traffic.traffic import SharedChannel, Traffic
-from tests.contract.giving_way.conftest import bay, corridor, hall
+from tests.contract.giving_way.conftest import RADIUS, bay, corridor, hall
 
 
 def announced(name, x_from, x_to, remaining):
@@ -67,6 +67,72 @@ def test_the_robot_that_goes_first_pulls_out_itself_when_the_other_one_stands_an
     assert "has pulled out" in result.message and "for ben; waited 4" in result.message
     assert 2.4 < motion.end.x < 3.4 and motion.end.y > 3.7
     assert not right_of_way(traffic.own, traffic.others(motion.seconds)[0])
+
+
+class Standing(Radio):
+    """Ben stands without a goal, and drives off by 2 m as soon as he is asked, unless he is ``stubborn``."""
+
+    stubborn, asked = False, False
+
+    def anew(self, one):
+        self.asked = self.asked or any(other.asks for other in SharedChannel.latest(self))
+        off = (0.0, 2.0 * (self.asked and not self.stubborn), 0.0)
+        return replace(super().anew(one), path=one.path[:1] + off, remaining=0.0, makes_room=True)
+
+
+def test_one_that_stands_in_the_way_without_a_goal_is_asked_for_room_and_waited_for(give_way):
+    traffic = head_on(0.0, Standing(until=100.0))
+    result, motion = give_way(corridor, traffic=traffic, longest_wait=6.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert "has the right of way over ben" in result.message
+    assert traffic._channel.asked and not traffic.own.asks
+    assert motion.seconds < 2.0 and all(command.is_stopped() for command in motion.commands)
+
+
+def test_one_that_makes_no_room_all_the_same_is_not_pulled_out_for(give_way):
+    channel = Standing(until=100.0)
+    channel.stubborn = True
+    result, motion = give_way(bay(2.4, 3.4, True), traffic=head_on(0.0, channel), longest_wait=6.0)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    assert motion.seconds == pytest.approx(6.0, abs=0.6) and motion.end.x == 4.5
+
+
+def stands_idle(*others):
+    """Traffic of the robot at ``START``, which has no goal, among others."""
+    channel, traffic = Radio(until=100.0), Traffic()
+    traffic.connect("anna", channel)
+    traffic.announce(Announcement("", 0.0, np.array([(4.5, 3.0, 0.0)]), 0.0, makes_room=True))
+    for other in others:
+        channel.publish(other)
+    return traffic
+
+
+def test_one_without_a_goal_pulls_out_of_the_path_of_the_one_that_asks_and_does_not_wait(give_way):
+    asking = replace(announced("ben", 6.5, 0.5, 9.0), asks=True)
+    result, motion = give_way(bay(2.4, 3.4, True), traffic=stands_idle(asking), longest_wait=60.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert "makes room for ben" in result.message
+    assert 2.4 < motion.end.x < 3.4 and motion.end.y > 3.7
+    assert motion.seconds < 30.0 and motion.least_gap > RADIUS
+
+
+def test_it_keeps_clear_of_those_that_do_not_ask_where_it_can_and_only_there(give_way):
+    asking, passing = replace(announced("ben", 6.5, 0.5, 9.0), asks=True), announced("carl", 0.5, 6.5, 9.0)
+    above = replace(passing, path=np.add(passing.path, (0.0, 1.0, 0.0)))
+    _, motion = give_way(hall, traffic=stands_idle(asking, above))
+    assert motion.end.y < 3.0 - 0.8
+    both = replace(above, path=np.concatenate([above.path, np.subtract(above.path, (0.0, 2.0, 0.0))]))
+    result, motion = give_way(hall, traffic=stands_idle(asking, both), reach=1.5)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert abs(motion.end.y - 3.0) > 0.8
+
+
+def test_without_a_place_it_says_so_at_once(give_way):
+    asking = replace(announced("ben", 6.5, 0.5, 9.0), asks=True)
+    result, motion = give_way(corridor, traffic=stands_idle(asking), reach=1.5)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    assert "no place 0.8 m beside the paths of others" in result.message
+    assert motion.seconds == 0.0
 
 
 def test_two_that_can_neither_yield_nor_wait_for_each_other_give_up(give_way):

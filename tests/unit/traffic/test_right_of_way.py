@@ -24,6 +24,8 @@ announcements = st.builds(
     remaining=st.integers(0, 3).map(float),
     cannot_yield=st.booleans(),
     waits=st.integers(0, 2),
+    makes_room=st.booleans(),
+    asks=st.booleans(),
 )
 fleets = st.lists(announcements, min_size=2, max_size=5, unique_by=lambda one: one.name)
 
@@ -46,12 +48,14 @@ def test_of_any_number_of_robots_exactly_one_goes_before_all_others(fleet):
     ("first", "second"),
     [
         ({"name": "zoe", "cannot_yield": True, "waits": 1, "remaining": 9.0}, {"name": "ben", "remaining": 1.0}),
+        ({"name": "zoe", "waits": 2, "remaining": 9.0}, {"name": "ben", "makes_room": True, "cannot_yield": True}),
         ({"name": "zoe", "remaining": 9.0}, {"name": "ben", "waits": 1, "remaining": 1.0}),
         ({"name": "zoe", "remaining": 1.0}, {"name": "ben", "remaining": 1.01}),
         ({"name": "anna", "remaining": 1.0}, {"name": "ben", "remaining": 1.0}),
     ],
     ids=[
         "one that cannot yield",
+        "one that makes room comes last",
         "then the one that has waited in vain less often",
         "then the one with the shorter path",
         "then by name",

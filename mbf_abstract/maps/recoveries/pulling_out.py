@@ -1,0 +1,119 @@
+"""Pulling out: search the nearest place beside the paths that must stay free, and drive there; a base of recoveries.
+
+Where a command is refused on the way, the robot waits for ``PAUSE``, in which somebody who moves there stops or passes,
+and searches anew, ``ATTEMPTS`` times in all. A robot that stands without a goal and is asked for room does only this:
+see ``make_room`` and ``server.making_room``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeAlias
+
+from mbf_abstract.geometry import FloatArray, Pose
+from mbf_abstract.maps.manoeuvres import Step
+from mbf_abstract.maps.pull_out import find_pull_out, paths_on_storey
+from mbf_abstract.maps.recoveries.manoeuvre_recovery import ManoeuvreParameters, ManoeuvreRecovery
+from mbf_abstract.maps.recoveries.wait import stand
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.parameters import parameter
+from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+from mbf_abstract.traffic.announcement import Announcement
+from mbf_abstract.traffic.right_of_way import MEETING_LENGTH
+
+ATTEMPTS, PAUSE = 4, 2.0  # to drive to a place; s between two of them
+PathsToKeepFree: TypeAlias = Callable[[Pose, Pose], Iterable[FloatArray]]
+"""What to keep free, the best first: points (n, 2) [m] in the plane of the robot where the search begins, for that pose
+and the pose at which the robot stood when it set out."""
+
+
+class PullingOutParameters(ManoeuvreParameters):
+    """Parameters of a recovery that pulls out."""
+
+    distance: float = parameter(
+        0.8,
+        "How far its base stands from its path, at least: half of both widths and a margin. Others meet it where their "
+        "path comes nearer.",
+        unit="m",
+        gt=0.0,
+        le=5.0,
+    )
+    reach: float = parameter(4.0, "Longest manoeuvre to such a place.", unit="m", gt=0.0, le=20.0)
+
+
+class PullingOutRecovery(ManoeuvreRecovery):
+    """Base of the recoveries that pull out."""
+
+    parameters: PullingOutParameters
+
+    @property
+    def meeting_distance(self) -> float:
+        """Others meet it where their path comes nearer than this [m]."""
+        return self.parameters.distance
+
+    def rivals(self) -> tuple[Announcement, ...]:
+        """Those that it meets; no fewer than those for which it was run as ``right_of_way_behavior``."""
+        p = self.parameters
+        return self.traffic.meet(self.clock.now(), p.distance, max(p.reach, MEETING_LENGTH))
+
+    def make_room(self, request: RecoveryRequest) -> RecoveryResult:
+        """Pull out for the robots that ask one without a goal, and stop there."""
+        asking = {rival.name for rival in self.rivals()}
+        if not asking:
+            return RecoveryResult(RecoveryOutcome.SUCCESS, "nobody asks for room any more")
+
+        def keep_free(begin: Pose, course: Pose) -> Iterator[FloatArray]:
+            return self._paths_of_others(begin, asking)
+
+        result = self.pull_out(request, keep_free, "the paths of others")
+        if not result.success:
+            return result
+        place, names = request.motion.pose(), ", ".join(sorted(asking))
+        return RecoveryResult(RecoveryOutcome.SUCCESS, f"makes room for {names} at ({place.x:.2f}, {place.y:.2f})")
+
+    def _paths_of_others(self, begin: Pose, asking: set[str]) -> Iterator[FloatArray]:
+        """Yield the paths of all robots that go somewhere, then those of the robots that ask."""
+        going = [other for other in self.traffic.others(self.clock.now()) if other.remaining > 0.0]
+        for chosen in (going, [other for other in going if other.name in asking]):
+            points = paths_on_storey(begin, [other.points_ahead(math.inf) for other in chosen])
+            if len(points):
+                yield points
+
+    def pull_out(self, request: RecoveryRequest, keep_free: PathsToKeepFree, beside: str) -> RecoveryResult:
+        """Search a place and drive there section by section; search anew where the drive there is not free.
+
+        ``beside`` says in the text of a failure what the place has to be beside of.
+        """
+        p, token = self.parameters, request.cancel_token
+        result = RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
+        course = request.motion.pose()
+        for attempt in range(ATTEMPTS):
+            if attempt:
+                paused = stand(request, PAUSE)  # somebody who moves there stops before this robot, or passes
+                if not paused.success:
+                    return paused
+            begin = request.motion.pose()
+            steps = self._manoeuvre(begin, keep_free(begin, course), request)
+            if token.cancelled:
+                return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
+            if steps is None:
+                text = f"no place {p.distance:g} m beside {beside} within a manoeuvre of {p.reach:g} m"
+                return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
+            self.traffic.set_cannot_yield(False)
+            result = self.drive_along(begin, steps, request)
+            if result.outcome != RecoveryOutcome.IMPASSABLE:
+                break
+        return result
+
+    def _manoeuvre(self, begin: Pose, keep_free: Iterable[FloatArray], request: RecoveryRequest) -> list[Step] | None:
+        """Shortest manoeuvre in the plane of ``begin`` to a place beside the first of these for which there is one."""
+        p, token = self.parameters, request.cancel_token
+        start, turning_radius = self.on_map(begin), self.min_turning_radius
+        for free in keep_free:
+            steps = find_pull_out(
+                self.navigation_map, start, free, p.distance, p.reach, turning_radius, lambda: token.cancelled
+            )
+            if steps is not None or token.cancelled:
+                return steps
+        return None
