@@ -184,7 +184,7 @@ def _default(field: FieldInfo) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float):
-        return ".inf" if math.isinf(value) else f"{value:.6g}"
+        return f"{'-' if value < 0.0 else ''}.inf" if math.isinf(value) else f"{value:.6g}"
     if isinstance(value, tuple | list | dict):
         return "{}" if isinstance(value, dict) and not value else str(list(value))
     return str(getattr(value, "value", value))

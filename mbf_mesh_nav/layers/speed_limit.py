@@ -1,8 +1,8 @@
 """Speed limit: regions where the robot must drive slowly, as polygons on the map.
 
-When to use: ramps, crossings, places with people; ``type: mbf_mesh_nav.layers.speed_limit:SpeedLimitLayer``. When not:
-to keep the robot out, use ``keepout``. Cost: one look-up per command. Known failure: the limit applies from the moment
-the robot's centre is inside, so draw a region with the distance the robot needs to brake.
+When to use: ramps, crossings, places with people. When not: to keep the robot out, use ``keepout``. Cost: one look-up
+per command. Known failure: the limit applies from the moment the robot's centre is inside, so draw a region with the
+distance the robot needs to brake.
 
 It has no costs, and is no default layer; whatever drives is slowed down, see
 ``mbf_abstract.maps.layers.obeyed_limits``. A limit of 0 m/s is none that can be driven at: paths through it

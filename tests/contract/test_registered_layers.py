@@ -28,6 +28,7 @@ MESH_PARAMETERS = {
     "keepout": {"regions": [{"polygon": CORNERS}]},
     "label": {"regions": [{"polygon": CORNERS, "label": "mud"}], "label_costs": {"mud": 0.4}},
     "obstacle": {"decay_time": 10.0},
+    "speed_limit": {"regions": [{"polygon": CORNERS, "speed_limit": 0.3}]},
     "moving_obstacles": {"sources": ["sensor"]},
 }
 SCAN = RangeScan.of_rays("laser", (3.5, 2.0, 0.3), [(4.5, 2.0, 0.3), (3.5, 3.0, 0.5), (2.5, 2.4, 0.3)], [True] * 3, 0.9)

@@ -38,7 +38,7 @@ mesh_map:
   mesh_file: room.ply
   layers:
     - {name: border, type: border}
-    - {name: slow, type: "mbf_mesh_nav.layers.speed_limit:SpeedLimitLayer"}
+    - {name: slow, type: speed_limit}
   border: {threshold: 0.5}
   slow: {limit_type: KIND, regions: [{polygon: ZONE, speed_limit: LIMIT}]}
 """,

@@ -2,12 +2,15 @@
 
 import dataclasses
 import importlib
+import math
 import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from mbf_abstract.config.registry import PluginRegistry
+from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.recording.metrics import Metrics
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -76,3 +79,12 @@ def test_every_key_of_a_scenario_has_a_sentence_and_every_type_of_a_block_a_sect
     for block, kind in (("world", "mesh"), ("features", "boulders"), ("sensors", "depth"), ("actors", "crowd")):
         assert re.search(rf"^### `{block}` of type .*`{kind}`", page, re.MULTILINE)
     assert page.count("| `max_tilt` |") == 1, "a model is shown once"
+
+
+@pytest.mark.parametrize("value", [-math.inf, math.inf, 0.0, -0.25, 1e-6, 123456.0])
+def test_a_default_reads_in_yaml_as_the_number_that_it_is(value):
+    class Model(ParameterModel):
+        limit: float = parameter(value, "A limit.", allow_inf=True)
+
+    shown = importlib.import_module("parameter_tables")._default(Model.model_fields["limit"])
+    assert float(yaml.safe_load(shown)) == value

@@ -83,7 +83,7 @@ def test_a_map_without_layers_of_its_own_has_nothing_to_clear_and_is_never_stale
 
 
 def test_a_layer_without_costs_limits_speed_in_the_window_and_hides_no_obstacle(tiled_hills):
-    slow = MeshLayerEntry(name="slow", type="mbf_mesh_nav.layers.speed_limit:SpeedLimitLayer")
+    slow = MeshLayerEntry(name="slow", type="speed_limit")
     everywhere = [[-1000.0, -1000.0], [1000.0, -1000.0], [1000.0, 1000.0], [-1000.0, 1000.0]]
     blocks = {"slow": {"regions": [{"polygon": everywhere, "speed_limit": 0.2}]}}
     tiled = TiledMap(tiled_hills)
