@@ -94,7 +94,7 @@ def test_a_goal_in_a_lethal_spot_is_blocked_goal_and_names_the_layer(planner_cla
     planner = make_plugin(planner_class, mesh_map)
     result = planner.make_plan(PlanRequest(Pose.planar(1.0, 1.0), Pose.planar(3.0, 3.0)))
     assert result.outcome == GetPathOutcome.BLOCKED_GOAL
-    assert result.message.endswith("is blocked: lethal in layer painted")
+    assert "is blocked: lethal in layer painted; lethal ground of painted separates them" in result.message
     result = planner.make_plan(PlanRequest(Pose.planar(3.0, 1.0), Pose.planar(1.0, 3.0)))
     assert result.outcome == GetPathOutcome.BLOCKED_START
 
