@@ -217,7 +217,7 @@ class NavigationMap(ABC):
         return math.inf
 
     def speed_limit_at(self, pose: Pose, full_speed: float) -> float:
-        """Lowest speed [m/s] that layers allow at ``pose``, at most ``full_speed``; see ``speed_limits``."""
+        """Lowest speed [m/s] that layers allow at ``pose``, at most ``full_speed``; see ``layers.obeyed_limits``."""
         return full_speed
 
     # -------------------------------------------------------------------------------------------------- layers

@@ -81,7 +81,7 @@ class MapLayer(ABC):
     def speed_limit_at(self, pose: Pose, full_speed: float) -> float:
         """Allowed speed [m/s] of a robot at ``pose`` in the frame of the map, at most ``full_speed``; as it is here.
 
-        ``full_speed``, which may be inf, is what a limit in percent is a share of. See ``speed_limits``.
+        ``full_speed``, which may be inf, is what a limit in percent is a share of. See ``obeyed_limits``.
         """
         return full_speed
 
