@@ -22,8 +22,6 @@ from terrain.commands.replay import open_replay, replay, replay_page
 from terrain.commands.rerun import rerun
 from terrain.commands.scenarios import scenarios
 
-MOST_FACES = 100_000  # of a ground over which a run measures the shortest path, in half a second; sweeps always do
-
 if TYPE_CHECKING:
     from collections.abc import Callable
     from contextlib import AbstractContextManager
@@ -135,7 +133,6 @@ def run(
                 on_note=live.note,
                 executive=executive,
                 geodesic=True,
-                geodesic_faces=MOST_FACES,
                 write_views=partial(write_results, on_step=live.step),
                 write_joint_views=partial(write_joint_results, on_step=live.step),
             )

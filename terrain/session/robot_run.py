@@ -109,11 +109,10 @@ class RobotRun:
         session, options, sequence = self._session, self._options, self.sequence
         recording = session.recorder.finish(events=session.memory.events, began=session.loop.origin)
         metrics, result = _measure(recording, session, sequence), sequence.last_result or NO_GOALS
-        is_compared = options.geodesic and len(session.world.open_surface().faces) <= options.geodesic_faces
-        if is_compared and result.success:
+        if options.geodesic and result.success:
             metrics |= _compare_with_geodesic(recording, session.world, metrics["path_length_m"])
         recording = replace(recording, verdict=judge(result, session.scenario.limits, metrics))
-        if is_compared:
+        if options.geodesic:
             metrics["spl"] = success_by_path_length(recording.verdict.success, metrics)
         wall_time = self.wall_time
         factor = recording.duration / wall_time if wall_time > 0.0 else 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
@@ -61,9 +60,7 @@ class RunOptions(SessionOptions):
     outside : callable, optional
         Makes what visits the goals of a session instead of an executive of that name, where somebody outside drives.
     geodesic : bool
-        Measure the shortest path over the ground too, which takes 0.1 to 2 s, and the SPL.
-    geodesic_faces : float
-        Faces of the ground up to which it is measured.
+        Measure the shortest path over the ground too, which takes up to about a second, and the SPL.
     stay : bool
         Wait for further goals after those of the scenario, see ``GoalSequence.go_to``.
     watch : callable
@@ -83,7 +80,6 @@ class RunOptions(SessionOptions):
     executive: str = "move_base"
     outside: Callable[[Session], GoalExecutive] | None = None
     geodesic: bool = False
-    geodesic_faces: float = math.inf
     stay: bool = False
     watch: Watch = lambda session, goals: nullcontext()
     write_views: WriteViews = lambda folder, recording, metrics: ()

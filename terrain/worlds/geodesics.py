@@ -23,12 +23,25 @@ from mbf_abstract.geometry.arithmetic import norm
 from terrain.worlds.occupancy import OccupancyGrid
 from terrain.worlds.surface import Surface, height_grid
 
-IntArray = NDArray[np.int64]
+IntArray = NDArray[np.int32]  # half the memory of int64, and memory is most of the time
 
 POINTS_PER_EDGE = 3
-SLACK = 1.1
+DETOUR = 1.05  # of the first search; most shortest paths over open ground are found in it
 SEARCH_RADIUS = 1.0  # m around a place in which its face is looked for
 FLOOR_CELL = 0.2  # m; width of the squares that a building's floor is made of
+
+
+def _connections_of_face() -> IntArray:
+    """Which nodes of a face are joined, (2, M): points of a side with the corner opposite and with the next side.
+
+    A face has its three corners first, then the points of each side; side s lies between corners s and s + 1.
+    """
+    side = [3 + s * POINTS_PER_EDGE + np.arange(POINTS_PER_EDGE) for s in range(3)]
+    joined = [(one, other) for s in range(3) for one in side[s] for other in ((s + 2) % 3, *side[(s + 1) % 3])]
+    return np.array(joined, dtype=np.int32).T
+
+
+CONNECTIONS = _connections_of_face()
 
 
 def geodesic_length(surface: Surface, places: Sequence[Sequence[float]], driven: float = math.inf) -> float:
@@ -39,41 +52,85 @@ def geodesic_length(surface: Surface, places: Sequence[Sequence[float]], driven:
     places : sequence of (3,) float
         On the surface, or up to a metre off it: then the nearest point counts.
     driven : float
-        Length [m] of a path that leads through all of them; the shortest is looked for no farther afield, which
+        Length [m] of a path that leads through all of them, where to look if nearly straight ones do not do. It
         changes nothing but the time it takes.
     """
-    faces = surface.faces.astype(np.int64)
-    if math.isfinite(driven):
-        faces = faces[_within_reach(surface.vertices, faces, np.array(places, dtype=float).reshape(-1, 3), driven)]
-    points, nodes_of_faces, starts, ends = _graph(surface.vertices, faces)
-    own = len(points) + np.arange(len(places))
-    for number, place in zip(own.tolist(), places, strict=True):
-        face, _ = _nearest_face(surface.vertices[faces], np.asarray(place, dtype=float))
-        if face < 0:
-            return float("inf")
-        starts = np.concatenate([starts, np.full(nodes_of_faces.shape[1], number)])
-        ends = np.concatenate([ends, nodes_of_faces[face]])
-    points = np.concatenate([points, np.array(places, dtype=float).reshape(-1, 3)])
-    lengths = np.maximum(norm(points[starts] - points[ends]), 1e-12)  # 0 would mean no connection
-    graph = coo_array((lengths, (starts, ends)), (len(points), len(points))).tocsr()
-    legs = [dijkstra(graph, directed=False, indices=a)[b] for a, b in pairwise(own.tolist())]
-    return float(np.sum(legs))
+    stops, faces = np.array(places, dtype=float).reshape(-1, 3), surface.faces.astype(np.int32)
+    straight = norm(np.diff(stops, axis=0))
+    as_driven = driven - float(straight.sum()) + straight  # m; the other legs are straight at best
+    reaches = DETOUR * straight
+    while True:
+        legs = _search(surface.vertices, faces, stops, reaches)
+        is_shortest = (legs <= reaches) | np.isinf(reaches)  # nothing shorter leads through what was left out
+        if is_shortest.all():
+            return float(np.sum(legs))
+        wider = np.where(np.isfinite(legs), legs, np.where(reaches < as_driven, as_driven, math.inf))
+        reaches = np.where(is_shortest, reaches, wider)
 
 
-def _within_reach(vertices: FloatArray, faces: IntArray, places: FloatArray, driven: float) -> NDArray[np.bool_]:
-    """Whether each face (F,) has a corner in reach of a leg: in the ellipsoid of paths that are not longer.
+def _search(vertices: FloatArray, faces: IntArray, stops: FloatArray, reaches: FloatArray) -> FloatArray:
+    """Length [m] (K - 1,) of the shortest path of each leg between stops (K, 3), over the faces in its reach."""
+    faces = faces[_within_reach(vertices, faces, stops, reaches)]
+    near = [_nearest_face(vertices[faces], stop) for stop in stops]
+    if min(near, default=-1) < 0:
+        return np.full(len(reaches), math.inf)
+    points, nodes, connections = _graph(vertices, faces)
+    own, around = len(points) + np.arange(len(stops), dtype=np.int32), nodes[:, near]  # around: (nodes of a face, K)
+    connections.append((np.broadcast_to(own, around.shape), around, norm(points[around] - stops)))
+    starts, ends, lengths = (
+        np.concatenate([part.ravel() for part in column]) for column in zip(*connections, strict=True)
+    )
+    size = len(points) + len(stops)
+    graph = coo_array((np.maximum(lengths, 1e-12), (starts, ends)), (size, size)).tocsr()  # 0 would mean no connection
+    return np.array([dijkstra(graph, directed=False, indices=a)[b] for a, b in pairwise(own.tolist())])
 
-    A leg can be as long as what was driven without the other legs, which are straight at best. ``SLACK`` covers
-    lengths that are measured from samples, and the error of the search; the longest edge, faces that stick out.
+
+def _within_reach(vertices: FloatArray, faces: IntArray, stops: FloatArray, reaches: FloatArray) -> NDArray[np.bool_]:
+    """Whether each face (F,) can be touched by a leg: by paths not longer than its reach, which fill an ellipsoid.
+
+    The longest edge is added for faces that stick out of it; faces around the stops belong to it in any case.
     """
-    straight = norm(np.diff(places, axis=0))
     triangles = vertices[faces]
     longest = float(norm(triangles - np.roll(triangles, 1, axis=1)).max(initial=0.0))
-    reached = np.zeros(len(vertices), dtype=bool)
-    for start, end, length in zip(places[:-1], places[1:], straight, strict=True):
-        reach = SLACK * max(driven - float(straight.sum() - length), float(length)) + 2.0 * longest
-        reached |= norm(vertices - start) + norm(vertices - end) <= reach
+    away = [norm(vertices - stop) for stop in stops]
+    reached = np.minimum.reduce(away) <= SEARCH_RADIUS + longest
+    for start, end, reach in zip(away[:-1], away[1:], reaches.tolist(), strict=True):
+        reached |= start + end <= reach + 2.0 * longest
     return np.asarray(reached[faces].any(axis=1))
+
+
+def _graph(
+    vertices: FloatArray, faces: IntArray
+) -> tuple[FloatArray, IntArray, list[tuple[IntArray, IntArray, FloatArray]]]:
+    """Nodes (N, 3), which of them each face has (3 + 3 k, F), and parts of all connections: both ends and lengths."""
+    corners, size = faces.astype(np.int64), len(vertices)
+    others = np.roll(corners, -1, axis=1)
+    codes, edge_of_side = np.unique(
+        np.minimum(corners, others) * size + np.maximum(corners, others), return_inverse=True
+    )
+    edges = np.stack(np.divmod(codes, size)).astype(np.int32)
+    shares = np.arange(1, POINTS_PER_EDGE + 1)[:, None, None] / (POINTS_PER_EDGE + 1)
+    a, b = vertices[edges]
+    points = np.concatenate([vertices, (a + shares * (b - a)).reshape(-1, 3)])
+    on_edges = size + np.arange(POINTS_PER_EDGE * len(codes), dtype=np.int32).reshape(POINTS_PER_EDGE, -1)
+    chains = np.concatenate([edges[:1], on_edges, edges[1:]])
+    on_sides = on_edges[:, edge_of_side.reshape(-1, 3)]  # (k, F, 3)
+    nodes = np.concatenate([faces.T, on_sides.transpose(2, 0, 1).reshape(-1, len(faces))])
+    places = points[nodes]
+    across = [(nodes[i], nodes[j], norm(places[i] - places[j])) for i, j in CONNECTIONS.T.tolist()]
+    return points, nodes, [*across, (chains[:-1], chains[1:], norm(np.diff(points[chains], axis=0)))]
+
+
+def _nearest_face(triangles: FloatArray, place: FloatArray) -> int:
+    """Index of the triangle (F, 3, 3) nearest to a place, -1 if none is within a metre."""
+    near = (triangles.min(axis=1) - SEARCH_RADIUS <= place) & (place <= triangles.max(axis=1) + SEARCH_RADIUS)
+    candidates = np.flatnonzero(near.all(axis=1))
+    if len(candidates) == 0:
+        return -1
+    nearest = closest_point(triangles[candidates], np.tile(place, (len(candidates), 1)))
+    distances = norm(nearest - place)
+    best = int(np.argmin(distances))
+    return int(candidates[best]) if distances[best] <= SEARCH_RADIUS else -1
 
 
 def free_floor(grid: OccupancyGrid) -> Surface:
@@ -84,35 +141,3 @@ def free_floor(grid: OccupancyGrid) -> Surface:
     width = step * grid.resolution
     x, y = grid.origin_x + width * np.arange(nx + 1), grid.origin_y + width * np.arange(ny + 1)
     return height_grid(x, y, np.zeros((ny + 1, nx + 1)), free)
-
-
-def _graph(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
-    """Nodes (N, 3), the nodes (F, 3 + 3 k) of every face, and both ends (M,) of every connection, each once."""
-    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    edges, edge_of_side = np.unique(sides, axis=0, return_inverse=True)
-    shares = np.arange(1, POINTS_PER_EDGE + 1) / (POINTS_PER_EDGE + 1)
-    a, b = vertices[edges[:, 0], None], vertices[edges[:, 1], None]
-    points = np.concatenate([vertices, (a + shares[:, None] * (b - a)).reshape(-1, 3)])
-    on_edge = len(vertices) + np.arange(len(edges) * POINTS_PER_EDGE).reshape(len(edges), POINTS_PER_EDGE)
-    chains = np.column_stack([edges[:, 0], on_edge, edges[:, 1]])
-    connections = [(chains[:, k], chains[:, k + 1]) for k in range(POINTS_PER_EDGE + 1)]
-    on_sides = on_edge[edge_of_side.reshape(-1, 3)]  # (F, 3, k); side s is opposite to corner s + 2
-    for side in range(3):
-        here, there, corner = on_sides[:, side], on_sides[:, (side + 1) % 3], faces[:, (side + 2) % 3]
-        for k in range(POINTS_PER_EDGE):
-            connections.append((here[:, k], corner))
-            connections += [(here[:, k], there[:, other]) for other in range(POINTS_PER_EDGE)]
-    starts, ends = (np.concatenate(column) for column in zip(*connections, strict=True))
-    return points, np.column_stack([faces, on_sides.reshape(len(faces), -1)]), starts, ends
-
-
-def _nearest_face(triangles: FloatArray, place: FloatArray) -> tuple[int, float]:
-    """Index of the triangle (F, 3, 3) nearest to a place and the distance [m]; -1 if none is within a metre."""
-    near = (triangles.min(axis=1) - SEARCH_RADIUS <= place) & (place <= triangles.max(axis=1) + SEARCH_RADIUS)
-    candidates = np.flatnonzero(near.all(axis=1))
-    if len(candidates) == 0:
-        return -1, float("inf")
-    nearest = closest_point(triangles[candidates], np.tile(place, (len(candidates), 1)))
-    distances = norm(nearest - place)
-    best = int(np.argmin(distances))
-    return (int(candidates[best]), float(distances[best])) if distances[best] <= SEARCH_RADIUS else (-1, float("inf"))

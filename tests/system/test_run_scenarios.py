@@ -23,10 +23,11 @@ def nearby(scenario, **changes):
 
 @pytest.mark.parametrize(("name", "backend"), [("outdoor", "mesh"), ("indoor", "costmap")])
 def test_the_robot_arrives_and_leaves_its_results(name, backend, tmp_path):
-    result = run(load_scenario(name), tmp_path, backend=backend)
+    result = run(load_scenario(name), tmp_path, backend=backend, geodesic=True)
     assert result.success, result.verdict
     assert result.metrics["distance_to_goal_m"] < 0.5
     assert result.metrics["real_time_factor"] > 1.0
+    assert 0.9 < result.metrics["spl"] <= 1.0
     assert json.loads((tmp_path / "metrics.json").read_text())["outcome"] == "SUCCESS"
     assert (tmp_path / "events.jsonl").stat().st_size > 0
     assert (tmp_path / "recording.npz").is_file()
