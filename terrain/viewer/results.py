@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from terrain.viewer.pictures.picture import ViewerMissing
 from terrain.viewer.pictures.run_picture import joint_picture_png, picture_png
 from terrain.viewer.replay.replay_page import joint_replay_html, replay_html
 from terrain.viewer.reports.report import report_html
+
+Makers = list[tuple[str, str, Callable[[Path], None]]]  # what is done, the name of the file, what makes it
 
 
 def write_results(
@@ -34,13 +37,19 @@ def write_results(
         drawn.append(picture_png(recording))  # the report shows it too
         write_whole(file, drawn[0])
 
-    makers: list[tuple[str, str, Callable[[Path], None]]] = [
+    drawings: Makers = [
         ("drawing the picture", "picture.png", draw),
         ("writing the report", "report.html", lambda file: write_whole(file, report_html(recording, metrics, *drawn))),
+    ]
+    logs: Makers = [
         ("writing the replay", "replay.html", lambda file: write_whole(file, replay_html(recording))),
         ("writing the log for Foxglove", "run.mcap", lambda file: _write_log(file, recording)),
     ]
-    return _make_all(folder, makers, on_step)
+    with ThreadPoolExecutor(1) as beside:  # most of it is compression, for which two threads use two cores
+        problems_beside = beside.submit(_make_all, folder, logs)
+        problems = _make_all(folder, drawings, on_step)
+        on_step("writing the replay and the log for Foxglove")
+        return list(dict.fromkeys([*problems, *problems_beside.result()]))
 
 
 def write_joint_results(
@@ -51,16 +60,14 @@ def write_joint_results(
 ) -> list[str]:
     """Write picture.png and replay.html of several robots together; as ``write_results``."""
     run = JointRecording(recordings, verdict)
-    makers: list[tuple[str, str, Callable[[Path], None]]] = [
+    makers: Makers = [
         ("drawing all robots", "picture.png", lambda file: write_whole(file, joint_picture_png(run))),
         ("writing their replay", "replay.html", lambda file: write_whole(file, joint_replay_html(run))),
     ]
     return _make_all(folder, makers, on_step)
 
 
-def _make_all(
-    folder: Path, makers: list[tuple[str, str, Callable[[Path], None]]], on_step: Callable[[str], None]
-) -> list[str]:
+def _make_all(folder: Path, makers: Makers, on_step: Callable[[str], None] = lambda text: None) -> list[str]:
     problems: list[str] = []
     for step, name, make in makers:
         on_step(step)

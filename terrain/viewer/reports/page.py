@@ -50,7 +50,7 @@ def image(what: str, png: bytes) -> str:
     kind, data = "png", png
     if features.check("webp"):
         buffer = io.BytesIO()
-        Image.open(io.BytesIO(png)).convert("RGB").save(buffer, "WEBP", quality=WEBP_QUALITY)
+        Image.open(io.BytesIO(png)).convert("RGB").save(buffer, "WEBP", quality=WEBP_QUALITY, method=2)
         kind, data = "webp", buffer.getvalue()
     text = base64.b64encode(data).decode("ascii")
     return f'<img alt="{escape(what)}" src="data:image/{kind};base64,{text}">'
