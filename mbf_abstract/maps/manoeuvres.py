@@ -113,6 +113,11 @@ def find_manoeuvre(
     return None
 
 
+def radius_beyond(most: float) -> float:
+    """Radius [m] of curves no step of which is as short as ``most`` [m], for a robot that must not turn."""
+    return 2.0 * most / HEADING
+
+
 def kinds_of_steps(turning_radius: float) -> list[Step]:
     """Steps from the origin: straight and in curves, forward and backward, and turns on the spot if it can."""
     radius = max(turning_radius, LEAST_RADIUS)

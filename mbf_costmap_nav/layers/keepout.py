@@ -41,6 +41,16 @@ class KeepoutLayer(AreaLayer):
         """A limit: nothing drives here."""
         return "" if zone.speed_limit is None else "speed_limit has no effect in a keep-out layer"
 
+    def lethal_reason(self, x: float, y: float) -> str:
+        """The zone there, or the mask."""
+        if not self.placement.known:
+            return ""
+        there = self.placement.to_data(np.array([[x, y]]))[0].tolist()
+        zone = next((zone for zone in self.zones if zone.contains(*there)), None)
+        if zone is not None:
+            return f"zone {zone.name!r}"
+        return "the mask" if self._costs is not None else "the edge of a zone"
+
     @property
     def permanent(self) -> bool:
         """Whether its areas are in the costmap's frame."""

@@ -39,6 +39,7 @@ class AreaLayer(CostmapLayer):
         Where zones and mask lie on the costmap.
     """
 
+    draws_areas = True
     parameters: AreaLayerParameters
 
     def __init__(self, context: LayerContext) -> None:

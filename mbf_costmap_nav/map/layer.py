@@ -2,8 +2,7 @@
 
 One update of a ``LayeredCostmap`` runs in two passes over its layers, in the configured order:
 
-1. ``update_bounds``: a layer takes in new data and returns the box of cells that may change, grown from the box
-   of the layers before it.
+1. ``update_bounds``: a layer takes in new data and grows the box of cells that may change, of the layers before it.
 2. ``update_costs``: the box is reset and every layer writes its part into the shared cells.
 
 All hooks run while the costmap's lock is held: they must not call back into the costmap, and must not wait.
@@ -87,7 +86,9 @@ class CostmapLayer(MapLayer):
 
     contract_check: ClassVar[str] = "mbf_costmap_nav.testing:check_layer"
     clearable: ClassVar[bool] = True
-    """Whether clearing names it, and takes an area out of it, if no layers are named; false for a floor plan."""
+    """Whether clearing names it, and takes an area out of it, if no layers are named; not a floor plan."""
+    draws_areas: ClassVar[bool] = False
+    """Whether nothing stands where it forbids: somebody has drawn it."""
     geometry: GridGeometry
 
     def __init__(self, context: LayerContext) -> None:
@@ -121,10 +122,7 @@ class CostmapLayer(MapLayer):
         return False
 
     def missing_floor(self) -> str:
-        """Why the floor plan of ``map_topic`` is not there, so that nothing can be planned; empty if all is well.
-
-        Called on any thread.
-        """
+        """Why the floor plan of ``map_topic`` is not there, so that nothing can be planned; empty if it is."""
         return ""
 
     def match_geometry(self, geometry: GridGeometry) -> None:
@@ -139,9 +137,9 @@ class CostmapLayer(MapLayer):
         """Take over the outline of the robot, padded and not."""
 
     def parameters_changed(self) -> None:
-        """Take over ``parameters``, which have just been replaced; the next update recomputes the whole map.
+        """Take over ``parameters``, just replaced, where something was derived from them; the next update computes all.
 
-        Needed only where something was derived from them. May raise ValueError: the old ones are then put back.
+        May raise ValueError: the old ones are then put back.
         """
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
@@ -167,6 +165,10 @@ class CostmapLayer(MapLayer):
     def permanent(self) -> bool:
         """Whether neither a sensor nor a transform changes its cells: what it forbids stays forbidden."""
         return False
+
+    def lethal_reason(self, x: float, y: float) -> str:
+        """Why the cell at (x, y) [m] is lethal, for a user: what is drawn there; empty if the layer's name says all."""
+        return ""
 
     @property
     def only_raises(self) -> bool:

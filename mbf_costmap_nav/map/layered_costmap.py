@@ -21,13 +21,14 @@ from mbf_abstract.maps.layers.layer_list import making
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.map.cell_causes import CellCauses
 from mbf_costmap_nav.map.cell_window import CellWindow
 from mbf_costmap_nav.map.layer import CostmapLayer
-from mbf_costmap_nav.map.layer_answers import LayerAnswers, legal_box
+from mbf_costmap_nav.map.layer_answers import legal_box
 from mbf_costmap_nav.map.permanent_layers import PermanentLayers
 
 
-class LayeredCostmap(LayerAnswers):
+class LayeredCostmap(CellCauses):
     """Layers and the cells they produce.
 
     Parameters

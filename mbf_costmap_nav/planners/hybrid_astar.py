@@ -87,14 +87,14 @@ class HybridAStarPlanner(CostmapPlanner):
         check_tolerance(request.dist_tolerance)
         world = self._world(request)
         legs: list[CarLeg] = []
-        failure = _misfit(world, "start", request.start)
+        failure = self._misfit(world, "start", request.start)
         if failure is not None and failure.outcome == GetPathOutcome.BLOCKED_START:
             failure = replace(failure, message=f"{failure.message}; {getting_free(self.costmap, request.start)}")
         for number, (start, goal) in enumerate(pairwise((request.start, *request.via, request.goal))):
             is_last = number == len(request.via)
             tolerance = request.dist_tolerance if is_last else 0.0
             name = "goal" if is_last else f"via pose {number + 1}"
-            failure = failure or _misfit(world, name, goal, tolerance)
+            failure = failure or self._misfit(world, name, goal, tolerance)
             leg = None if failure or request.cancel_token.cancelled else self._search(world, start, goal, tolerance)
             if request.cancel_token.cancelled:
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
@@ -158,7 +158,7 @@ class HybridAStarPlanner(CostmapPlanner):
         ends = f"from ({start.x:.2f}, {start.y:.2f}) to the {name} ({goal.x:.2f}, {goal.y:.2f})"
         if leg is None and not world.fits(goal):
             text = f"the robot does not fit at the goal ({goal.x:.2f}, {goal.y:.2f}, {goal.yaw:.2f} rad)"
-            return PlanResult(GetPathOutcome.BLOCKED_GOAL, text)
+            return PlanResult(GetPathOutcome.BLOCKED_GOAL, text + self._closed_by(goal))
         if leg is None:
             return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no path {ends}, not even for a point robot")
         if leg.status == GAVE_UP:
@@ -175,17 +175,23 @@ class HybridAStarPlanner(CostmapPlanner):
         text = "" if OVER_BORDER in failure.message else f"; {OVER_BORDER}"
         return replace(failure, message=failure.message + text, permanent=True)
 
+    def _misfit(self, world: CarWorld, name: str, pose: Pose, tolerance: float = 0.0) -> PlanResult | None:
+        """Why nothing can be planned to or from a pose, if that is known without a search."""
+        problem = off_map(world.costmap, pose, name, tolerance)
+        if problem or tolerance > 0.0 or world.fits(pose):
+            return problem
+        outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
+        text = f"the robot does not fit at the {name} ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad)"
+        if world.leaves_map(pose):
+            return PlanResult(outcome, f"{text}: {OVER_BORDER}")
+        return PlanResult(
+            outcome, f"{text}, centre cost {world.costmap.cost_at(pose.x, pose.y)}{self._closed_by(pose)}"
+        )
 
-def _misfit(world: CarWorld, name: str, pose: Pose, tolerance: float = 0.0) -> PlanResult | None:
-    """Why nothing can be planned to or from a pose, if that is known without a search."""
-    problem = off_map(world.costmap, pose, name, tolerance)
-    if problem or tolerance > 0.0 or world.fits(pose):
-        return problem
-    outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
-    text = f"the robot does not fit at the {name} ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad)"
-    if world.leaves_map(pose):
-        return PlanResult(outcome, f"{text}: {OVER_BORDER}")
-    return PlanResult(outcome, f"{text}, centre cost {world.costmap.cost_at(pose.x, pose.y)}")
+    def _closed_by(self, pose: Pose) -> str:
+        """The layer that makes the centre's cell lethal; empty if none does."""
+        layer = self.costmap.lethal_reason(pose.x, pose.y)
+        return f", lethal in layer {layer}" if layer else ""
 
 
 def to_path(poses: FloatArray, heights: FloatArray, frame_id: str, stamp: float) -> Path:

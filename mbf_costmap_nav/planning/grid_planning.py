@@ -142,12 +142,12 @@ class GridPlanner(CostmapPlanner):
             is_last = number == len(poses) - 2
             tolerance = request.dist_tolerance if is_last else 0.0
             name = "goal" if is_last else f"via pose {number + 1}"
-            failure = failure or _check_goal(grid, goal, tolerance, name)
+            failure = failure or self._check_goal(grid, goal, tolerance, name)
             leg = NO_LEG if failure or request.cancel_token.cancelled else self.search(grid, start, goal, tolerance)
             if request.cancel_token.cancelled:
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if len(leg.points) == 0:
-                failure = failure or not_even_beside(_no_path(grid, start, goal, name), tolerance)
+                failure = failure or not_even_beside(self._no_path(grid, start, goal, name), tolerance)
                 return marked_if_permanent(failure, self.costmap, start, goal, tolerance, self.parameters.lethal_cost)
             reached_goal = leg.reached_goal and grid.costmap.contains(goal.x, goal.y)
             piece = with_exact_ends(grid, leg.points, start, goal if reached_goal else None)
@@ -160,9 +160,29 @@ class GridPlanner(CostmapPlanner):
         if cell is None:
             return off_map(grid.costmap, start, "start")
         if grid.is_blocked(cell):
-            text = f"{_blocked(grid, 'start', start, cell)}; {getting_free(self.costmap, start)}"
+            text = f"{self._blocked(grid, 'start', start, cell)}; {getting_free(self.costmap, start)}"
             return PlanResult(GetPathOutcome.BLOCKED_START, text)
         return None
+
+    def _check_goal(self, grid: SearchGrid, goal: Pose, tolerance: float, name: str) -> PlanResult | None:
+        cell = grid.cell_of(goal)
+        if grid.is_blocked(cell) and tolerance <= 0.0 and grid.costmap.contains(goal.x, goal.y):
+            return PlanResult(GetPathOutcome.BLOCKED_GOAL, self._blocked(grid, name, goal, cell))
+        return off_map(grid.costmap, goal, name, tolerance)
+
+    def _blocked(self, grid: SearchGrid, name: str, pose: Pose, cell: Cell) -> str:
+        text = f"{name} ({pose.x:.2f}, {pose.y:.2f}) lies in cell {cell} of cost {grid.costmap.cost(*cell)}"
+        layer = self.costmap.lethal_reason(pose.x, pose.y)
+        return f"{text}, lethal in layer {layer}" if layer else text
+
+    def _no_path(self, grid: SearchGrid, start: Pose, goal: Pose, name: str) -> PlanResult:
+        """Failure that distinguishes a goal without a reachable cell around it from a goal behind walls."""
+        cell = grid.cell_of(goal)
+        if grid.is_blocked(cell) or not grid.costmap.contains(goal.x, goal.y):
+            return PlanResult(GetPathOutcome.BLOCKED_GOAL, self._blocked(grid, name, goal, cell))
+        distance = math.hypot(goal.x - start.x, goal.y - start.y)
+        ends = f"({start.x:.2f}, {start.y:.2f}) to the {name} ({goal.x:.2f}, {goal.y:.2f})"
+        return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no path from {ends}, {distance:.2f} m away")
 
 
 def marked_if_permanent(
@@ -194,26 +214,3 @@ def off_map(costmap: Costmap, pose: Pose, name: str, tolerance: float = 0.0) -> 
     if costmap.contains(pose.x, pose.y) or math.dist(centre, (pose.x, pose.y)) <= tolerance:
         return None
     return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{name} ({pose.x:.2f}, {pose.y:.2f}) is outside {costmap}")
-
-
-def _check_goal(grid: SearchGrid, goal: Pose, tolerance: float, name: str) -> PlanResult | None:
-    cell = grid.cell_of(goal)
-    if grid.is_blocked(cell) and tolerance <= 0.0 and grid.costmap.contains(goal.x, goal.y):
-        return PlanResult(GetPathOutcome.BLOCKED_GOAL, _blocked(grid, name, goal, cell))
-    return off_map(grid.costmap, goal, name, tolerance)
-
-
-def _blocked(grid: SearchGrid, name: str, pose: Pose, cell: Cell) -> str:
-    return f"{name} ({pose.x:.2f}, {pose.y:.2f}) lies in cell {cell} of cost {grid.costmap.cost(*cell)}"
-
-
-def _no_path(grid: SearchGrid, start: Pose, goal: Pose, name: str) -> PlanResult:
-    """Failure that distinguishes a goal without a reachable cell around it from a goal behind walls."""
-    cell = grid.cell_of(goal)
-    if grid.is_blocked(cell) or not grid.costmap.contains(goal.x, goal.y):
-        return PlanResult(GetPathOutcome.BLOCKED_GOAL, _blocked(grid, name, goal, cell))
-    distance = math.hypot(goal.x - start.x, goal.y - start.y)
-    text = (
-        f"no path from ({start.x:.2f}, {start.y:.2f}) to the {name} ({goal.x:.2f}, {goal.y:.2f}), {distance:.2f} m away"
-    )
-    return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)

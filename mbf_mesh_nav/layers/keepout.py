@@ -35,6 +35,12 @@ class KeepoutLayer(MeshLayer):
                 return f"regions[{index}]: there is no ground in it, at its heights"
         return ""
 
+    def lethal_reason(self, vertex: int) -> str:
+        """The region that closes it."""
+        mesh, regions = self.topology, self.parameters.regions
+        closing = (k for k, one in enumerate(regions) if one.closed_mask(mesh.vertices, mesh.edges, mesh.faces)[vertex])
+        return next((f"regions[{index}]" for index in closing), "")
+
     @classmethod
     def reach(cls, parameters: KeepoutParameters) -> float:
         """0: the edges and faces at a vertex are all it looks at."""

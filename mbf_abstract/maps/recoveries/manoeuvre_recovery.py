@@ -32,6 +32,11 @@ class ManoeuvreRecovery(GuardedRecovery):
 
     parameters: ManoeuvreParameters
 
+    @property
+    def manoeuvre_speed(self) -> float:
+        """How fast [m/s] a manoeuvre is driven, forward and backward."""
+        return self.parameters.speed
+
     def drive_along(self, begin: Pose, steps: list[Step], request: RecoveryRequest) -> RecoveryResult:
         """Drive steps that begin at ``begin``, section by section, to the end or to what a command is refused for."""
         frame = Transform(begin.position, begin.orientation, begin.frame_id, "begin")
@@ -50,7 +55,7 @@ class ManoeuvreRecovery(GuardedRecovery):
         last = np.asarray(poses[-1].position) + poses[-1].rotation[:, 0] * (gear * LOOKAHEAD)
         points = np.array([*(pose.position for pose in poses), last])
         tracker = PathTracker(Path.from_points(points, frame_id=poses[0].frame_id))
-        speed, limit = gear * self.parameters.speed, self.parameters.yaw_rate
+        speed, limit = gear * self.manoeuvre_speed, self.parameters.yaw_rate
 
         def finished(pose: Pose) -> bool:
             tracker.update(pose.position)
@@ -60,9 +65,9 @@ class ManoeuvreRecovery(GuardedRecovery):
             _, curvature = arc_to(pose, tracker.point_at(tracker.progress + LOOKAHEAD))
             return Twist.planar(vx=speed, wz=max(-limit, min(limit, speed * curvature)))
 
-        return self.drive(request, velocity, finished, self._obstacle_on_manoeuvre)
+        return self.drive(request, velocity, finished, self.obstacle_on_manoeuvre)
 
-    def _obstacle_on_manoeuvre(self, pose: Pose, command: Twist) -> str:
+    def obstacle_on_manoeuvre(self, pose: Pose, command: Twist) -> str:
         """As for a path: a manoeuvre is searched where the robot touches nothing, and asked for no more."""
         return self.navigation_map.obstacle_on_path(self.on_map(pose), command, self.parameters.check_ahead_time)
 
