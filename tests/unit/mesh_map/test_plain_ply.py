@@ -1,4 +1,4 @@
-"""A binary PLY of vertices and triangles is read as trimesh reads it, and everything else is left to trimesh."""
+"""A PLY of vertices and triangles is read as trimesh reads it, and everything else is left to trimesh."""
 
 import subprocess
 import sys
@@ -17,6 +17,10 @@ from mbf_mesh_nav.mesh.welding import join_boundaries
 
 VERTEX = "property float x\nproperty float y\nproperty float z\n"
 FACE = "property list uchar int vertex_indices\n"
+TEXT = (
+    f"ply\nformat ascii 1.0\nelement vertex 3\n{VERTEX}property uchar red\nelement face 1\n{FACE}end_header\n"
+    "0 0 0 5\n1 0 -0.0 7\n0 1 0.1 9\n3 0 1 2\n"
+)
 
 
 def ply(vertex=VERTEX, face=FACE, form="binary_little_endian", corners=3, tail=b""):
@@ -39,8 +43,12 @@ def test_a_plain_file_is_read_as_trimesh_reads_it_bit_for_bit(tmp_path, monkeypa
         tmp_path / "a.ply"
     )
     (tmp_path / "b.ply").write_bytes(ply())
+    hills = trimesh.Trimesh(*heightfield_mesh(np.sin(np.arange(20.0)).reshape(4, 5), 0.1, 0.3), process=False)
+    hills.export(tmp_path / "c.ply", encoding="ascii")
+    (tmp_path / "d.ply").write_text(TEXT)
+    (tmp_path / "e.ply").write_text(TEXT.rstrip().replace("float", "double").replace("\n", " \r\n"))
 
-    for name in ("a.ply", "b.ply"):
+    for name in ("a.ply", "b.ply", "c.ply", "d.ply", "e.ply"):
         plain, other = read_plain_ply(tmp_path / name), by_trimesh(tmp_path / name, monkeypatch)
         assert [(array.dtype, array.tobytes()) for array in plain] == [
             (array.dtype, array.tobytes()) for array in other
@@ -51,6 +59,23 @@ def test_a_plain_file_is_read_as_trimesh_reads_it_bit_for_bit(tmp_path, monkeypa
     "content",
     [
         ply(form="ascii"),
+        *(
+            TEXT.replace(old, new).encode()
+            for old, new in (
+                ("3 0 1 2", "4 0 1 2 2"),
+                ("3 0 1 2", "3 0 1"),
+                ("3 0 1 2", "3 0 1 two"),
+                ("3 0 1 2", "3 0 1 1.5"),
+                ("3 0 1 2", "3 0 1 nan"),
+                ("3 0 1 2", "3 0 1 1e300"),
+                ("3 0 1 2\n", "3 0 1 2 more"),
+                ("3 0 1 2\n", "3 0 1 2\n\n"),
+                ("3 0 1 2\n", "3 0 1 2\n1\n"),
+                ("1 0 -0.0 7", "1 0\n-0.0 7"),
+                ("0 1 0.1 9\n", ""),
+                ("ascii 1.0", "ascii 2.0"),
+            )
+        ),
         ply(form="binary_big_endian"),
         ply(corners=4),
         ply(tail=b"\0"),
@@ -80,8 +105,9 @@ def test_a_plain_file_with_more_faces_than_allowed_is_refused(tmp_path):
         read_scene(tmp_path / "one.ply", "", 0)
 
 
-def test_a_plain_file_is_read_without_importing_trimesh(tmp_path):
-    (tmp_path / "one.ply").write_bytes(ply())
+@pytest.mark.parametrize("content", [ply(), TEXT.encode()])
+def test_a_plain_file_is_read_without_importing_trimesh(tmp_path, content):
+    (tmp_path / "one.ply").write_bytes(content)
     code = (
         "import sys, pathlib\nfrom mbf_mesh_nav.files.mesh_io import read_mesh\n"
         f"read_mesh(pathlib.Path({str(tmp_path / 'one.ply')!r}))\nprint('trimesh' in sys.modules)"
