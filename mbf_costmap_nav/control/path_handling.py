@@ -20,10 +20,10 @@ from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.controllers.failures import collision, missed_path, no_path, outside_map
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_costmap_nav.grid.contact import first_refused
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
-from mbf_costmap_nav.grid.motion_check import first_refused
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.plugins import CostmapContext, CostmapController
 

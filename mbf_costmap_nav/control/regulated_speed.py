@@ -12,6 +12,7 @@ from typing import ClassVar
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_costmap_nav.control.path_handling import PathFollower
 from mbf_costmap_nav.grid.costmap import FREE, INSCRIBED
+from mbf_costmap_nav.grid.footprint import Footprint
 
 DEFAULT_DECAY, LEAST_DECAY = 10.0, 1e-3
 """1/m: of a map without an inflation layer, and of one whose costs do not fall at all."""
@@ -85,6 +86,21 @@ class RegulatedFollower(PathFollower):
 
     Parameters: ClassVar[type[PluginParameters]] = RegulatedPurePursuitParameters
     parameters: RegulatedPurePursuitParameters
+    _outline: tuple[Footprint, Footprint] | None = None
+    """The costmap's outline without padding, and the one used by the collision check."""
+
+    def parameters_changed(self) -> None:
+        """Drop the outline with the old padding."""
+        self._outline = None
+
+    def checked_footprint(self) -> Footprint:
+        """The costmap's outline, with the padding of the collision check where one is given."""
+        padding, bare = self.parameters.collision_check_padding, self.costmap.unpadded_footprint
+        if padding is None:
+            return self.costmap.footprint
+        if self._outline is None or self._outline[0] is not bare:
+            self._outline = bare, bare.padded(padding)
+        return self._outline[1]
 
     @property
     def full_speed(self) -> float:

@@ -20,6 +20,7 @@ from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.end_of_path import at_exact_end, swept_poses, turn_left
 from mbf_abstract.maps.controllers.failures import blocked_path, obstacle_text
 from mbf_abstract.maps.controllers.room_to_turn import (
+    CREEPING,
     SMALL_TURN,
     RoomToTurn,
     along_path,
@@ -33,11 +34,11 @@ from mbf_abstract.maps.controllers.room_to_turn import (
 from mbf_abstract.maps.controllers.tight_places import CLOSE_FROM, CLOSELY, TightPlaces
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_costmap_nav.control.leaving_contact import turn_that_leads_out
 from mbf_costmap_nav.control.path_geometry import look_ahead_point
 from mbf_costmap_nav.control.path_handling import ControlCycle, to_base_frame
 from mbf_costmap_nav.control.regulated_speed import RegulatedFollower
 from mbf_costmap_nav.grid.costmap import FREE
-from mbf_costmap_nav.grid.footprint import Footprint
 
 LEADS_OUT = 0.3  # m; so far a robot that touches something looks whether the motion leads out
 SWEEP_STEP = 0.1  # cells; from pose to pose of a turn at the goal, which must look the same from every heading in it
@@ -51,32 +52,19 @@ class RegulatedPurePursuitController(RegulatedFollower):
     _at_goal = False
     _room_to_turn = RoomToTurn()
     _tight_places = TightPlaces()
-    _outline: tuple[Footprint, Footprint] | None = None
-    """The costmap's outline without padding, and the one used by the collision check."""
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path; that the robot stood at the end of the last one no longer counts."""
         self._at_goal, self._room_to_turn, self._tight_places = False, RoomToTurn(), TightPlaces()
         return super().set_plan(path)
 
-    def parameters_changed(self) -> None:
-        """Drop the outline with the old padding."""
-        self._outline = None
-
-    def checked_footprint(self) -> Footprint:
-        """The costmap's outline, with the padding of the collision check where one is given."""
-        padding, bare = self.parameters.collision_check_padding, self.costmap.unpadded_footprint
-        if padding is None:
-            return self.costmap.footprint
-        if self._outline is None or self._outline[0] is not bare:
-            self._outline = bare, bare.padded(padding)
-        return self._outline[1]
-
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """Find the carrot, choose between turning and driving, regulate the speed, look ahead for collisions."""
         cycle = self.begin_cycle(request)
         if isinstance(cycle, ControlResult):
             return cycle
+        if (way_out := self._way_out(cycle)) is not None:
+            return ControlResult(ExePathOutcome.SUCCESS, "", way_out)
         motions = self._motions(cycle)
         result = self._checked(cycle, motions)
         if not self._at_goal and self._tight_places.drives_otherwise(cycle.tracker, motions[0], result.command):
@@ -85,6 +73,16 @@ class RegulatedPurePursuitController(RegulatedFollower):
         if blocked and self.tracker and self._tight_places.begin_next_stroke(self.tracker):
             return self.compute_velocity_commands(request)
         return result
+
+    def _way_out(self, cycle: ControlCycle) -> Twist | None:
+        """The motion that leads straight out of what is touched; None for a car, at the goal and where none does."""
+        if not (cycle.touches and self.rotates) or self._turn_at_goal(cycle) is not None:
+            return None
+        backward = self._backward(cycle)
+        angle = turn_that_leads_out(cycle, self._angle_left(cycle), backward)
+        if angle == 0.0:
+            return self._slowed(Twist.planar(-CREEPING if backward else CREEPING), cycle.request.velocity)
+        return None if angle is None else self._turn(cycle, angle)
 
     def _motions(self, cycle: ControlCycle) -> list[Twist]:
         """The motion that is wanted, then those that make room for it."""

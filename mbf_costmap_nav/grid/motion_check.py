@@ -1,8 +1,8 @@
 """What a footprint would touch along a motion on a costmap, and where the nearest obstacle lies.
 
-A robot that already touches an obstacle may move as long as it touches no more than before, and nothing deeper, so
-backing out of a collision works and driving on into it does not; once it is free it stays so. Where the whole footprint
-lies on obstacles no direction is known to lead out, and only ``escape`` may move.
+A robot that already touches an obstacle may move as long as it touches nothing deeper and nothing else, so backing out
+of a collision works and driving on into it does not (``contact``); once it is free it stays so. Where the whole
+footprint lies on obstacles no direction is known to lead out, and only ``escape`` may move.
 
 A robot that touches nothing collides where planners and controllers say so, by the samples of ``FootprintCheck``: a
 corner of a cell that the outline clips by less than a quarter of its side counts for none of them. Otherwise a path
@@ -19,17 +19,15 @@ import numpy as np
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.failures import obstacle_text
+from mbf_costmap_nav.grid.contact import first_deeper_pose, on_cells
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.kernels.map.footprint_cost import OUTSIDE
-from mbf_costmap_nav.kernels.map.penetration import penetration
 from mbf_costmap_nav.kernels.map.rasterisation import blocked_under
 
 CYCLE = 0.05
 """Time [s] from one command to the next: the poses looked at include those where a controller is asked again."""
-ROUNDING = 0.1
-"""How much [cells] deeper counts as no deeper: along a wall the depth of a round outline goes up and down so far."""
 
 
 def obstacle_ahead(
@@ -42,7 +40,7 @@ def obstacle_ahead(
     leaves_collisions: bool = False,
     may_overhang: bool = False,
 ) -> str:
-    """Where the motion would touch more obstacle cells or map border than now, as a text; empty if it is free.
+    """Where the motion would touch obstacles or the map's border deeper than now, as a text; empty if it is free.
 
     Parameters
     ----------
@@ -62,9 +60,7 @@ def obstacle_ahead(
     collision = (LETHAL,) if may_overhang else (LETHAL, OUTSIDE)
     check = _check(footprint, costmap.resolution)
     allowed, _ = blocked_at(pose.x, pose.y, pose.yaw)
-    deepest = np.inf
-    if allowed > 0 and not leaves_collisions:
-        deepest = touched_depth(costmap, footprint, pose.x, pose.y, pose.yaw) + ROUNDING
+    touches = allowed > 0 and not leaves_collisions
     on_map = costmap.contains(pose.x, pose.y)
     outline_speed = command.speed + abs(command.wz) * footprint.circumscribed_radius
     step = float(np.clip(0.5 * costmap.resolution / max(outline_speed, 1e-6), duration / 100.0, duration))
@@ -74,10 +70,13 @@ def obstacle_ahead(
     if allowed == 0 and _stays_inside(costmap, footprint, ahead):
         first = check.first_collision(costmap, ahead)
         ahead = ahead[first:] if first >= 0 else ahead[:0]
-    for x, y, yaw in ahead.tolist():
+    worse = first_deeper_pose(costmap, footprint, pose, ahead, counts_border=not may_overhang)[0] if touches else -1
+    for index, (x, y, yaw) in enumerate(ahead.tolist()):
         blocked, covered = blocked_at(x, y, yaw)
-        deeper = blocked > allowed and (allowed > 0 or check.cost(costmap, x, y, yaw) in collision)
-        deeper = deeper or (allowed > 0 and touched_depth(costmap, footprint, x, y, yaw) > deepest)
+        if touches:
+            deeper, touches = index == worse, blocked > 0
+        else:
+            deeper = blocked > allowed and (allowed > 0 or check.cost(costmap, x, y, yaw) in collision)
         leaves_map = may_overhang and on_map and not costmap.contains(x, y)
         if deeper or leaves_map or (blocked == covered and not leaves_collisions):
             return obstacle_text(f"({x:.2f}, {y:.2f}, {yaw:.2f} rad)")
@@ -90,29 +89,6 @@ def _stays_inside(costmap: Costmap, footprint: Footprint, poses: FloatArray) -> 
     reach = footprint.circumscribed_radius + costmap.resolution
     low, high = poses[:, :2].min(axis=0) - reach, poses[:, :2].max(axis=0) + reach
     return len(footprint.vertices) > 2 and costmap.contains(*low.tolist()) and costmap.contains(*high.tolist())
-
-
-def first_refused(costmap: Costmap, check: FootprintCheck, pose: Pose, poses: FloatArray) -> int:
-    """Index of the first of poses (n, 3: x, y, yaw) to which a robot that touches something at ``pose`` must not move.
-
-    It must touch nothing deeper than now, nothing at all once it is free, and less somewhere: else all of it is
-    refused. -1 if it may move so.
-    """
-    now, leads_out = touched_depth(costmap, check.footprint, pose.x, pose.y, pose.yaw), False
-    for index, (x, y, yaw) in enumerate(poses.tolist()):
-        if not check.collides(costmap, x, y, yaw):
-            hit = check.first_collision(costmap, poses[index:])
-            return index + hit if hit >= 0 else -1
-        depth = touched_depth(costmap, check.footprint, x, y, yaw)
-        if depth > now + ROUNDING:
-            return index
-        leads_out = leads_out or depth < now - ROUNDING
-    return -1 if leads_out else 0
-
-
-def touched_depth(costmap: Costmap, footprint: Footprint, x: float, y: float, yaw: float) -> float:
-    """How deep [cells] the middle of a lethal cell lies within the footprint, negative outside of it, at least -1."""
-    return float(penetration(costmap.cells, _on_cells(costmap, footprint, x, y, yaw)))
 
 
 @lru_cache(maxsize=8)
@@ -128,14 +104,8 @@ def blocked_cells(
     Each cell counts once, whatever part of it is covered. So a robot that backs out of a collision touches less and
     less; counted by samples, an obstacle weighs more under the outline, where they are denser.
     """
-    blocked, covered = blocked_under(costmap.cells, _on_cells(costmap, footprint, x, y, yaw), counts_border)
+    blocked, covered = blocked_under(costmap.cells, on_cells(costmap, footprint, x, y, yaw), counts_border)
     return int(blocked), int(covered)
-
-
-def _on_cells(costmap: Costmap, footprint: Footprint, x: float, y: float, yaw: float) -> FloatArray:
-    """Corners (n, 2) of the footprint at a pose, in cell coordinates."""
-    corners = footprint.at(x, y, yaw) if len(footprint.vertices) > 2 else np.array([[x, y]])
-    return np.asarray((corners - (costmap.origin_x, costmap.origin_y)) / costmap.resolution)
 
 
 def nearest_lethal(costmap: Costmap, pose: Pose, within: float) -> tuple[float, float, float] | None:

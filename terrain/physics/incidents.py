@@ -207,15 +207,16 @@ class IncidentMonitor:
         """Whether the robot moves by itself: by its command, or by its wheels before a contact.
 
         What turns its wheels in a contact may be what pushes it, so only its command counts then, and afterwards until
-        they have come to rest.
+        it has come to rest: wheels that stand while it slides roll again when they grip.
         """
         by_command, rolls = not self._stands(sample.commanded), not self._stands(sample.rolling)
+        slides = not self._stands(sample.velocity)
         moves = by_command or self._rolls_by_itself
         if sample.touched:
             self._pushed = not (moves or self._moved_in_contact)
             self._rolls_by_itself = False
             return moves
-        self._pushed = self._pushed and rolls and not by_command
+        self._pushed = self._pushed and (rolls or slides) and not by_command
         self._rolls_by_itself = rolls and not self._pushed
         return moves or self._rolls_by_itself
 

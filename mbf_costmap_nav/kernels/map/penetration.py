@@ -1,6 +1,7 @@
-"""How deep lethal cells lie within a polygon: what a robot that touches something must not increase.
+"""How deep an outline lies in what it touches, thing by thing: what a robot in a contact must not increase.
 
-The number of touched cells does not say it: a pole of one cell counts one, from the bumper to the middle of the robot.
+The number of touched cells does not say it: a pole of one cell counts one, from the bumper to the middle of the robot,
+and a robot that leaves a wall beside a corner of it may touch more cells of its face, all of them less deep.
 """
 
 from __future__ import annotations
@@ -9,40 +10,65 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.map.rasterisation import rasterise_polygon
 
 FloatArray = NDArray[np.float64]
 
-NOT_NEAR = -1.0
-"""Depth where no lethal cell is as near as a cell."""
+UNTOUCHED = -np.inf
+"""Depth of what is not touched."""
 
 
 @kernel
-def penetration(cells: NDArray[np.uint8], corners: FloatArray) -> float:
-    """Greatest depth of the centre of a lethal cell within a simple polygon, as its distance from the nearest side.
+def first_deeper(things: NDArray[np.int32], outlines: FloatArray, rounding: float) -> tuple[int, FloatArray]:
+    """First of some outlines that lies deeper in a thing than the one at the begin did, or touches another thing.
+
+    A thing that was left must not be touched again.
 
     Parameters
     ----------
-    cells : (height, width) uint8
-    corners : (n, 2) float64
-        Corners in cell coordinates, n >= 1. One corner is a point, two are a segment.
+    things : (rows, columns) int32
+        Number of the thing that each cell belongs to, 0 where there is none; the outlines lie on this grid.
+    outlines : (m, n, 2) float64
+        Corners in cell coordinates from place to place of a motion, m and n >= 1. The first is where it begins.
+    rounding : float
+        How much [cells] deeper counts as no deeper.
 
     Returns
     -------
-    float
-        In cells; negative for a centre outside of the polygon, ``NOT_NEAR`` at the least.
+    first : int
+        From 1 on; m without one.
+    deepest : (m,) float64
+        Greatest depth [cells] of all things at each of the places up to the first one, ``UNTOUCHED`` after it.
     """
-    height, width = cells.shape
-    left, low = corners[0, 0], corners[0, 1]
-    right, high = left, low
-    for i in range(1, len(corners)):
-        left, right = min(left, corners[i, 0]), max(right, corners[i, 0])
-        low, high = min(low, corners[i, 1]), max(high, corners[i, 1])
-    deepest = NOT_NEAR
-    for row in range(max(0, int(np.floor(low)) - 1), min(height, int(np.floor(high)) + 2)):
-        for column in range(max(0, int(np.floor(left)) - 1), min(width, int(np.floor(right)) + 2)):
-            if cells[row, column] == 254:
-                deepest = max(deepest, _depth(corners, column + 0.5, row + 0.5))
-    return deepest
+    deepest, none = np.full(len(outlines), UNTOUCHED), np.full(things.max() + 1, UNTOUCHED)
+    limits = depths_in(things, outlines[0], none)
+    deepest[0] = limits.max()
+    for k in range(1, len(outlines)):
+        depths = depths_in(things, outlines[k], none)
+        deepest[k] = depths.max()
+        for number in range(len(limits)):
+            if depths[number] > limits[number] + rounding:
+                return k, deepest
+            if depths[number] == UNTOUCHED:
+                limits[number] = UNTOUCHED
+    return len(outlines), deepest
+
+
+@kernel
+def depths_in(things: NDArray[np.int32], corners: FloatArray, at_least: FloatArray) -> FloatArray:
+    """Depth [cells] of a simple polygon (n, 2) in each thing, but ``at_least`` (things,) so much.
+
+    That of the deepest of its cells that the polygon covers, which is the distance of the cell's centre from the
+    nearest side of the polygon, negative for a centre outside of it.
+    """
+    depths = at_least.copy()
+    x0, y0, mask = rasterise_polygon(corners, (0, 0, things.shape[1], things.shape[0]))
+    for row in range(mask.shape[0]):
+        for column in range(mask.shape[1]):
+            number = things[y0 + row, x0 + column]
+            if mask[row, column] != 0 and number > 0:
+                depths[number] = max(depths[number], _depth(corners, x0 + column + 0.5, y0 + row + 0.5))
+    return depths
 
 
 @kernel

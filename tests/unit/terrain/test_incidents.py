@@ -138,6 +138,11 @@ def test_wheels_that_roll_on_from_a_push_are_no_motion_in_the_next_contact() -> 
     assert contacts_while_moving({}, PERSON | ROLLING, ROLLING, PERSON | ROLLING) == 0
 
 
+def test_wheels_that_grip_while_a_pushed_robot_slides_are_no_motion_in_the_next_contact() -> None:
+    slides = {"velocity": Twist.planar(0.3, 0.1)}
+    assert contacts_while_moving({}, PERSON | slides, slides, slides | ROLLING, PERSON) == 0
+
+
 @pytest.mark.parametrize("between", [{}, DRIVEN], ids=["stood", "was told to drive"])
 def test_wheels_that_roll_after_a_push_count_again_once_the_robot(between: dict[str, object]) -> None:
     assert contacts_while_moving({}, PERSON | ROLLING, between, ROLLING, PERSON) == 1
