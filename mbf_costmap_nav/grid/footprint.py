@@ -14,6 +14,7 @@ import json
 import math
 import sys
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +24,8 @@ from mbf_costmap_nav.grid.outline_check import outline_problem
 
 FloatArray = NDArray[np.float64]
 
+OUTLINES_KEPT = 32
+"""So many offset outlines are kept: plans and motions ask for those of a few robots again and again."""
 CIRCLE_POINTS = 16
 AS_A_CIRCLE = 1.02
 """An outline whose radii differ by no more than this factor, which is that of 16 corners, stands for a circle."""
@@ -119,11 +122,7 @@ class Footprint:
             return self
         if len(self.vertices) < 3:
             return Footprint.circle(distance / math.cos(math.pi / CIRCLE_POINTS))
-        hull = _convex_hull(self.vertices)
-        if len(hull) == 1:
-            x, y = hull[0]
-            return Footprint(np.add(Footprint([]).offset(distance).vertices, (x, y)))
-        return Footprint(_mitred_offset(hull, distance))
+        return _offset(self.vertices.tobytes(), distance)
 
 
 def parse_number_lists(text: str) -> list[list[float]]:
@@ -167,6 +166,16 @@ def _radii(points: FloatArray) -> tuple[float, float]:
     along = np.clip(-np.sum(points * sides, axis=1) / lengths_squared, 0.0, 1.0)
     nearest = points + along[:, None] * sides
     return float(norm(nearest).min()), float(norm(points).max())
+
+
+@lru_cache(maxsize=OUTLINES_KEPT)
+def _offset(vertices: bytes, distance: float) -> Footprint:
+    """Footprint that keeps ``distance`` [m] from one of three corners or more, the bytes of (n, 2) float64."""
+    hull = _convex_hull(np.frombuffer(vertices).reshape(-1, 2))
+    if len(hull) == 1:
+        x, y = hull[0]
+        return Footprint(np.add(Footprint([]).offset(distance).vertices, (x, y)))
+    return Footprint(_mitred_offset(hull, distance))
 
 
 def _convex_hull(points: FloatArray) -> FloatArray:

@@ -13,11 +13,11 @@ from numpy.typing import DTypeLike, NDArray
 
 from mbf_costmap_nav.kernels.map.footprint_cost import first_collision, first_lethal
 from mbf_costmap_nav.kernels.map.inflation import _column_distances, _spread_rows
-from mbf_costmap_nav.kernels.map.line_cells import cost_along
 from mbf_costmap_nav.kernels.map.outline_along import fits_along
-from mbf_costmap_nav.kernels.map.path_poses import level_path
+from mbf_costmap_nav.kernels.map.path_poses import first_off_grid, level_path
 from mbf_costmap_nav.kernels.map.rasterisation import fill_polygon
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays, mark_points
+from mbf_costmap_nav.kernels.search.exact_ends import cell_centres, with_exact_ends
 from mbf_costmap_nav.kernels.search.grid_path import trace_cells
 from mbf_costmap_nav.kernels.search.grid_search import _write_and_search
 from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid
@@ -31,6 +31,8 @@ def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
     table, records, buckets = _example(np.float32), new_records(2), _example(np.int32, 2)
     costs = cells.copy()
     costs.flags.writeable = False  # a type of its own for numba
+    path = points.copy()
+    path.flags.writeable = False
     return [
         (_column_distances, (cells, 0, 0, cells, cost)),
         (_spread_rows, (cells, (0, 0, 0, 0), cells, 0, 0, 0, row, cost)),
@@ -40,9 +42,11 @@ def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
             (cells, _example(np.uint64, 2), records, table, 0, 0, 0.0, True, True, row, buckets, box),
         ),
         (trace_cells, (PaddedGrid(row, 0, table), records["g"], 0, True)),
-        (cost_along, (costs, 0, 0.0, 0.0, 0.0, 0.0)),
+        (cell_centres, (_example(np.int32), 0, reals)),
+        (with_exact_ends, (costs, 0, 0, reals, points, reals, reals, 0.0)),
         (fits_along, (costs, 0.0, 0.0, 0.0, points, points, 0.0, 0.0, 0.0, 0.0)),
         (level_path, (points, 0.0, 0.0)),
+        (first_off_grid, (path, 0, 0, 0.0, 0.0, 0.0)),
         (first_collision, (costs, 0.0, 0.0, 0.0, points, points)),
         (fill_polygon, (cells, points, 0)),
         (clear_rays, (cells, reals, 0.0, reals, points, 0.0, 0.0, 0, box)),

@@ -65,8 +65,10 @@ class LayerAnswers(SnapshotAnswers):
 
     def missing_floor(self) -> str:
         """That of the first enabled layer which misses one."""
-        reasons = ((layer.name, layer.missing_floor()) for layer in self.layers.enabled)
-        return next((f"layer {name!r}: {reason}" for name, reason in reasons if reason), "")
+        for layer in self.layers.enabled:
+            if reason := layer.missing_floor():
+                return f"layer {layer.name!r}: {reason}"
+        return ""
 
     def configuration_warnings(self) -> list[str]:
         """What is legal but hardly meant: of each layer, none that inflates, and a window smaller than the robot."""

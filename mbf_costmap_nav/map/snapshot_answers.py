@@ -19,6 +19,7 @@ from mbf_abstract.maps.tracking.contact import RobotBox
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.motion_check import blocked_cells, nearest_lethal, obstacle_ahead
+from mbf_costmap_nav.kernels.map.path_poses import first_off_grid
 from mbf_costmap_nav.map import pose_checks
 
 ROUND = 1.05
@@ -71,8 +72,11 @@ class SnapshotAnswers(LayeredMap):
 
     def first_outside(self, positions: FloatArray) -> int:
         """The first position off the grid; not asked of a window, which may have moved since the path was planned."""
-        outside = ~self.snapshot().world_to_cells(positions)[1]
-        return -1 if self.rolling_window or not outside.any() else int(np.argmax(outside))
+        if self.rolling_window:
+            return -1
+        grid = self.snapshot()
+        size = grid.width, grid.height, grid.resolution, grid.origin_x, grid.origin_y
+        return int(first_off_grid(np.ascontiguousarray(positions, dtype=np.float64), *size))
 
     def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
         """State and summed cost of the outline, see ``pose_checks.pose_check``."""

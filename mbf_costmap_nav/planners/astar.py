@@ -55,4 +55,4 @@ class AStarPlanner(GridPlanner):
             return NO_LEG
         trace = trace_cells(grid.padded, g, grid.index(end), cut)
         cost = float(g[grid.index(end)]) * grid.costmap.resolution
-        return Leg(grid.points(trace[::-1]), cost, end == goal_cell)
+        return Leg(grid.points(trace)[::-1], cost, end == goal_cell)

@@ -26,7 +26,7 @@ from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.grid.costmap import INSCRIBED, Costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.planning.manoeuvres import Fitted
-from mbf_costmap_nav.planning.path_assembly import assembled, with_exact_ends
+from mbf_costmap_nav.planning.path_assembly import assembled
 from mbf_costmap_nav.planning.path_fitting import PathFitting, shifted_request
 from mbf_costmap_nav.planning.permanent_walls import is_permanently_unreachable
 from mbf_costmap_nav.planning.search_grid import Cell, GridPlannerParameters, SearchGrid, SearchWorkspace
@@ -107,7 +107,7 @@ class GridPlanner(CostmapPlanner):
         pieces, cost, reached_goal = legs
         # 3. Does the outline fit all along?
         if fitting is None:
-            fitted = [Fitted(piece, np.full(len(piece), np.nan)) for piece in pieces]
+            fitted = [Fitted(piece) for piece in pieces]
         else:
             left = 0.0 if goal is not request.goal else request.dist_tolerance
             answer = fitting.fit(pieces, request.start, goal, left)
@@ -150,7 +150,7 @@ class GridPlanner(CostmapPlanner):
                 failure = failure or not_even_beside(self._no_path(grid, start, goal, name), tolerance)
                 return marked_if_permanent(failure, self.costmap, start, goal, tolerance, self.parameters.lethal_cost)
             reached_goal = leg.reached_goal and grid.costmap.contains(goal.x, goal.y)
-            piece = with_exact_ends(grid, leg.points, start, goal if reached_goal else None)
+            piece = grid.with_exact_ends(leg.points, start, goal if reached_goal else None)
             pieces.append(resample(piece, self.pose_spacing) if self.pose_spacing > 0.0 else piece)
             cost += leg.cost
         return pieces, cost, reached_goal

@@ -58,17 +58,17 @@ class Fitted:
     ----------
     points : (n, 2) float64
         [m]
-    yaws : (n,) float64
-        Headings [rad] on manoeuvres; nan where the robot looks along the path.
+    yaws : (n,) float64, optional
+        Headings [rad] on manoeuvres; nan where the robot looks along the path, None where it does so all along.
     """
 
     points: FloatArray
-    yaws: FloatArray
+    yaws: FloatArray | None = None
 
     @property
     def end_yaw(self) -> float:
         """Heading [rad] at the last point."""
-        if not math.isnan(self.yaws[-1]):
+        if self.yaws is not None and not math.isnan(self.yaws[-1]):
             return float(self.yaws[-1])
         (x0, y0), (x1, y1) = self.points[-2:].tolist()
         return math.atan2(y1 - y0, x1 - x0)
@@ -124,7 +124,7 @@ class Manoeuvres:
             How much [m] of the path's end may be left out where the robot does not fit at it.
         """
         if self._fits(points, start_yaw, end_yaw):
-            return Fitted(points, np.full(len(points), np.nan))
+            return Fitted(points)
         course = self._course(points, start_yaw, end_yaw)
         wrong = course.misfits(self._check, self.costmap)
         if wrong[-1] and spare > 0.0:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -19,6 +19,7 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.kernels.map.line_cells import cost_along
+from mbf_costmap_nav.kernels.search.exact_ends import cell_centres, with_exact_ends
 from mbf_costmap_nav.kernels.search.nearest_cell import nearest_reached
 from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid, pad_cells
 from mbf_costmap_nav.kernels.search.search_cells import Box, whole_grid
@@ -26,6 +27,10 @@ from mbf_costmap_nav.kernels.search.search_cells import Box, whole_grid
 Cell = tuple[int, int]
 Memory = TypeVar("Memory")
 
+TABLES_KEPT = 32
+NEAR_END = 0.75
+"""Points this near [cells] to an exact start or goal are dropped: going there first would be a step back."""
+NO_GOAL = np.full(2, np.nan)
 NO_ROBOT = np.zeros((0, 2))
 """Footprint samples of a robot that fits everywhere."""
 
@@ -132,8 +137,8 @@ class SearchGrid:
 
     def points(self, indices: NDArray[np.int32]) -> NDArray[np.float64]:
         """Centres (n, 2) [m] of flat padded indices (n,)."""
-        rows, columns = np.divmod(indices, self.padded.stride)
-        return self.costmap.cells_to_world(np.column_stack([columns - 1, rows - 1]))
+        centres: NDArray[np.float64] = cell_centres(indices, self.padded.stride, self.geometry)
+        return centres
 
     def is_blocked(self, cell: Cell) -> bool:
         """Whether the planner may not enter a cell."""
@@ -147,8 +152,20 @@ class SearchGrid:
             for point in (a, b)
             for value, origin in zip(np.asarray(point).tolist(), (grid.origin_x, grid.origin_y), strict=True)
         ]
-        unknown = LETHAL if math.isinf(self.padded.table[UNKNOWN]) else 0
-        return int(cost_along(grid.cells, unknown, *ends)) < self._first_blocked
+        return int(cost_along(grid.cells, self._unknown_on_lines, *ends)) < self._first_blocked
+
+    def with_exact_ends(self, points: NDArray[np.float64], start: Pose, goal: Pose | None) -> NDArray[np.float64]:
+        """Replace the cell centres (n, 2) [m] at the ends by the exact start, and by the exact goal if it is given."""
+        ends = np.array([start.x, start.y]), NO_GOAL if goal is None else np.array([goal.x, goal.y])
+        lines = self.costmap.cells, self._unknown_on_lines, self._first_blocked, self.geometry
+        given = np.ascontiguousarray(points, dtype=np.float64)
+        exact: NDArray[np.float64] = with_exact_ends(*lines, given, *ends, NEAR_END * self.costmap.resolution)
+        return exact
+
+    @property
+    def _unknown_on_lines(self) -> int:
+        """What an unknown cell counts as on a line."""
+        return LETHAL if math.isinf(self.padded.table[UNKNOWN]) else 0
 
     @cached_property
     def _first_blocked(self) -> int:
@@ -171,8 +188,12 @@ class SearchGrid:
         return None if ix < 0 else (int(ix), int(iy))
 
 
+@lru_cache(maxsize=TABLES_KEPT)
 def traversal_table(cost_factor: float, lethal_cost: int, allow_unknown: bool) -> NDArray[np.float32]:
-    """(256,) float32: weight of a metre by cell cost, 1 + cost_factor * cost / 252; inf where blocked."""
+    """(256,) float32: weight of a metre by cell cost, 1 + cost_factor * cost / 252; inf where blocked.
+
+    Not to be written to: other plans have the same array. Writable, as kernels know one kind of arrays.
+    """
     costs = np.minimum(np.arange(256), 252)
     table = (1.0 + cost_factor * costs / 252.0).astype(np.float32)
     table[lethal_cost:UNKNOWN] = np.inf

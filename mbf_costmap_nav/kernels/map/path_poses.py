@@ -73,6 +73,18 @@ def level_path(points: FloatArray, start_height: float, goal_height: float) -> t
 
 
 @kernel
+def first_off_grid(
+    points: FloatArray, width: int, height: int, resolution: float, origin_x: float, origin_y: float
+) -> int:
+    """Index of the first of the points (n, 2 or 3) [m] off a grid; -1 without one."""
+    for i in range(len(points)):
+        x, y = np.floor((points[i, 0] - origin_x) / resolution), np.floor((points[i, 1] - origin_y) / resolution)
+        if not (0.0 <= x < width and 0.0 <= y < height):
+            return i
+    return -1
+
+
+@kernel
 def _moves(positions: FloatArray, i: int) -> bool:
     return bool(
         positions[i + 1, 0] != positions[i, 0]

@@ -10,7 +10,7 @@ from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
-from mbf_costmap_nav.kernels.map.path_poses import course_along, headed_poses, level_path
+from mbf_costmap_nav.kernels.map.path_poses import course_along, first_off_grid, headed_poses, level_path
 from mbf_costmap_nav.planning.manoeuvres import Manoeuvres
 from mbf_costmap_nav.planning.outline_course import Course
 
@@ -105,3 +105,50 @@ def test_an_outline_fits_along_where_course_turns_and_headings_say_so():
         assert manoeuvres._fits(points, start, end) == expected
         answers.append(expected)
     assert 0.2 < np.mean(answers) < 0.8
+
+
+def test_the_first_collision_is_that_of_looking_at_every_sample_of_every_pose():
+    rng, answers = np.random.default_rng(10), []
+    outlines = [[-0.3, -0.2], [0.4, -0.2], [0.4, 0.2], [-0.3, 0.2]], [[0.1, 0.0], [0.3, 0.1], [0.2, 0.2]], []
+    for number in range(900):
+        check = FootprintCheck(Footprint(outlines[number % 3]), 0.05)
+        share = (3e-4, 3e-3, 3e-2)[number // 3 % 3]
+        costmap = Costmap(np.where(rng.random((90, 70)) < share, 254, 255).astype(np.uint8), 0.05, -1.0, 0.4)
+        steps = rng.uniform(-1.0, 1.0, (60, 3)) * (0.05, 0.05, 0.2) * rng.choice([0.2, 1.0, 8.0])
+        poses = rng.uniform((-1.5, 0.0, -4.0), (3.0, 5.5, 4.0)) + np.cumsum(steps, axis=0)  # some lead off the map
+        hits = check.collisions(costmap, poses)
+        expected = int(np.argmax(hits)) if hits.any() else -1
+        assert check.first_collision(costmap, poses) == expected
+        answers.append(expected)
+    assert 0.2 < np.mean(np.array(answers) >= 0) < 0.8
+
+
+def test_a_cell_whose_corner_a_sample_just_reaches_counts():
+    cells = np.zeros((40, 40), dtype=np.uint8)
+    cells[20, 30] = 254
+    costmap = Costmap(cells, 0.05)
+    poses = np.array([[1.0, 1.025, 0.0], [1.1, 1.025, 0.0], [1.2, 1.025, 0.0], [1.2 + 1e-9, 1.025, 0.0]])
+    check = FootprintCheck(Footprint([[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]]), 0.05)
+    hits = check.collisions(costmap, poses)
+    assert hits[-1] and not hits[0]
+    assert check.first_collision(costmap, poses) == int(np.argmax(hits))
+
+
+def test_the_first_point_off_a_grid_is_that_of_looking_up_every_cell():
+    rng, answers = np.random.default_rng(11), []
+    costmap = Costmap(np.zeros((60, 80), dtype=np.uint8), 0.05, -2.0, 0.5)
+    corners = [[-2.0, 0.5, 0.0], [2.0, 0.5, 0.0], [-2.0, 3.5, 0.0], [1.999, 3.499, 0.0], [-2.0 - 1e-9, 1.0, 0.0]]
+    for points in [np.array([corner]) for corner in corners] + [np.zeros((0, 3))]:
+        outside = ~costmap.world_to_cells(points)[1]
+        assert first_off(costmap, points) == (int(np.argmax(outside)) if outside.any() else -1)
+    for _ in range(300):
+        points = rng.uniform((-2.02, 0.48, -9.0), (2.02, 3.52, 9.0), (int(rng.integers(1, 60)), 3))
+        outside = ~costmap.world_to_cells(points)[1]
+        answers.append(int(np.argmax(outside)) if outside.any() else -1)
+        assert first_off(costmap, points) == answers[-1]
+    assert 0.1 < np.mean(np.array(answers) >= 0) < 0.9
+
+
+def first_off(costmap, points):
+    size = costmap.width, costmap.height, costmap.resolution, costmap.origin_x, costmap.origin_y
+    return first_off_grid(points, *size)
