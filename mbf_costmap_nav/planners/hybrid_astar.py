@@ -21,18 +21,20 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw
+from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.arrival_tolerance import ends_beside, not_even_beside
 from mbf_abstract.maps.getting_free import getting_free
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP
+from mbf_costmap_nav.kernels.map.path_poses import yaw_quaternions
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND
-from mbf_costmap_nav.planning.car_search import CarLeg, CarWorld, Driving, search_drive
+from mbf_costmap_nav.planning.car_search import CarLeg, Driving, search_drive
+from mbf_costmap_nav.planning.car_world import CarWorkspace, CarWorld
 from mbf_costmap_nav.planning.grid_planning import check_tolerance, marked_if_permanent, off_map
 from mbf_costmap_nav.planning.path_assembly import heights_along
-from mbf_costmap_nav.plugins import CostmapPlanner
+from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
 
 FloatArray = NDArray[np.float64]
 
@@ -75,6 +77,10 @@ class HybridAStarPlanner(CostmapPlanner):
 
     Parameters: ClassVar[type[PluginParameters]] = HybridAStarParameters
     parameters: HybridAStarParameters
+
+    def __init__(self, context: CostmapContext) -> None:
+        super().__init__(context)
+        self._workspace = CarWorkspace()
 
     @property
     def turning_radius(self) -> float:
@@ -121,12 +127,14 @@ class HybridAStarPlanner(CostmapPlanner):
             request.cancel_token,
             cost_factor=p.cost_factor,
             allow_unknown=p.allow_unknown,
+            workspace=self._workspace,
         )
 
     def _search(self, world: CarWorld, start: Pose, goal: Pose, tolerance: float) -> CarLeg | None:
         """Search to the goal or, if it is unreachable, to a reachable place within the tolerance; None without one."""
-        grid, wanted, from_start = world.grid, goal, world.field(start)
-        if not world.fits(goal) or math.isinf(from_start[grid.index(grid.cell_of(goal))]):
+        grid, wanted = world.grid, goal
+        reached, from_start = world.reached(start, goal) if world.fits(goal) else (False, world.field(start))
+        if not reached:
             end = None if grid.token.cancelled else grid.nearest_reached(from_start, goal, tolerance, world.samples)
             if end is None:
                 return None
@@ -134,9 +142,7 @@ class HybridAStarPlanner(CostmapPlanner):
         # The dearer poses change which states a bin keeps, so a passage hardly wider than the robot may be missed.
         few = replace(self._driving(), max_states=min(ROOMY_STATES, self.parameters.max_states))
         for driving, ground in ((few, world.ground(roomy=True)), (self._driving(), None)):
-            leg = search_drive(
-                world, driving, start, goal, from_start=from_start, wanted=wanted, tolerance=tolerance, ground=ground
-            )
+            leg = search_drive(world, driving, start, goal, wanted=wanted, tolerance=tolerance, ground=ground)
             if leg.status in (FOUND, CANCELED):
                 break
         return leg
@@ -196,5 +202,5 @@ class HybridAStarPlanner(CostmapPlanner):
 
 def to_path(poses: FloatArray, heights: FloatArray, frame_id: str, stamp: float) -> Path:
     """Path of poses (n, 3: x, y, yaw) at heights (n,); in reverse, headings point against the motion."""
-    orientations = np.array([quaternion_from_yaw(yaw) for yaw in poses[:, 2]])
+    orientations = yaw_quaternions(np.ascontiguousarray(poses[:, 2]))
     return Path(np.column_stack([poses[:, :2], heights]), orientations, frame_id, stamp)

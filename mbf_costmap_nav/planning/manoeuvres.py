@@ -178,7 +178,8 @@ class Manoeuvres:
 
     def _drive(self, course: Course, first: int, last: int, *, everywhere: bool) -> FloatArray | None:
         """Poses (n, 3) between two poses of a course that the outline can drive; None if none were found."""
-        from mbf_costmap_nav.planning.car_search import CarWorld, search_drive  # with kernels that few paths need
+        from mbf_costmap_nav.planning.car_search import search_drive  # with kernels that few paths need
+        from mbf_costmap_nav.planning.car_world import CarWorld
 
         radius = self.footprint.circumscribed_radius
         ends = course.poses[[first, last]]

@@ -40,6 +40,7 @@ from mbf_costmap_nav.kernels.car.motion_primitives import (
 from mbf_costmap_nav.kernels.car.state_tree import StateTree, best_state, new_tree, with_state
 from mbf_costmap_nav.kernels.compiled import Count, kernel
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FOUND
+from mbf_costmap_nav.kernels.search.lazy_field import FieldMemory, new_field
 
 Heap = list[tuple[float, int]]
 
@@ -109,8 +110,9 @@ def _nearest_state(tree: StateTree, goal: FloatArray, tolerance: float) -> int:
 def hybrid_search(
     ground: Ground,
     car: Car,
-    from_start: Target,
-    from_goal: Target,
+    ends: tuple[FloatArray, FloatArray],
+    cells: tuple[int, int],
+    memory: tuple[FieldMemory, FieldMemory],
     wanted: FloatArray,
     tolerance: float,
     max_states: int,
@@ -120,9 +122,12 @@ def hybrid_search(
 
     Parameters
     ----------
-    from_start, from_goal : Target
-        What the trees from the start and from the goal grow to: the goal with the cost-to-go to it, and the start with
-        the cost from there, in cells; inf where there is no path.
+    ends : two of (3,) float64
+        Poses of the start and of the goal.
+    cells : two int
+        Flat padded indices of their cells.
+    memory : two FieldMemory
+        For the field of costs from the start, and for that from the goal.
     wanted : (3,) float64
     tolerance : float
         If the goal is not reached, the state nearest to ``wanted`` that can be, at most so far [m] away and of its
@@ -141,7 +146,9 @@ def hybrid_search(
     states : int
         How many were made.
     """
-    start, goal = from_goal.pose, from_start.pose
+    (start, goal), (first, last_cell) = ends, cells
+    from_goal = Target(start, new_field(memory[0], first, last_cell, cancel_flag))
+    from_start = Target(goal, new_field(memory[1], last_cell, first, cancel_flag))
     tree = new_tree(start, _bin_of(ground, car, start), Count(NO_MOTION))
     other = new_tree(goal, _bin_of(ground, car, goal), Count(NO_MOTION))
     heap, other_heap = [(0.0, 0)], [(0.0, 0)]

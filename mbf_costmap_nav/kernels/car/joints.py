@@ -17,11 +17,9 @@ from mbf_costmap_nav.kernels.car.motion_primitives import (
 )
 from mbf_costmap_nav.kernels.car.state_tree import StateTree, best_state
 from mbf_costmap_nav.kernels.compiled import Count, kernel
+from mbf_costmap_nav.kernels.search.lazy_field import LazyField, field_cost
 
 FloatArray = NDArray[np.float64]
-
-
-Field = NDArray[np.float32]
 
 
 HEADINGS = 72
@@ -39,10 +37,10 @@ MEETINGS_PER_TRY = 8
 
 
 class Target(NamedTuple):
-    """What a tree grows to: the other root's ``pose`` (3,), and the ``field`` (height, width) of costs [m] to it."""
+    """What a tree grows to: the other root's ``pose`` (3,), and the ``field`` of costs [cells] to it."""
 
     pose: FloatArray
-    field: Field
+    field: LazyField
 
 
 class Joint(NamedTuple):
@@ -58,7 +56,7 @@ def heuristic(ground: Ground, car: Car, side: float, pose: FloatArray, target: T
     """Larger of the field [m] at the pose's cell and the length of the free curve."""
     geometry = ground.geometry
     ix, iy = int((pose[0] - geometry[1]) / geometry[0]), int((pose[1] - geometry[2]) / geometry[0])
-    around = float(target.field[iy, ix] * geometry[0])
+    around = float(field_cost(target.field, (iy + 1) * target.field.stride + ix + 1) * geometry[0])
     if around > CURVE_RANGE * car.radius:
         return around
     ends = (pose, target.pose) if side == FORWARD_SIDE else (target.pose, pose)

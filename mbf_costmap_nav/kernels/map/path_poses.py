@@ -73,6 +73,15 @@ def level_path(points: FloatArray, start_height: float, goal_height: float) -> t
 
 
 @kernel
+def yaw_quaternions(yaws: FloatArray) -> FloatArray:
+    """Quaternions (n, 4: x y z w) of rotations by yaws (n,) [rad] about z."""
+    quaternions = np.zeros((len(yaws), 4))
+    for i in range(len(yaws)):
+        quaternions[i, 2], quaternions[i, 3] = math.sin(yaws[i] / 2.0), math.cos(yaws[i] / 2.0)
+    return quaternions
+
+
+@kernel
 def first_off_grid(
     points: FloatArray, width: int, height: int, resolution: float, origin_x: float, origin_y: float
 ) -> int:

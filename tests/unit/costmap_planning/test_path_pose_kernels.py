@@ -3,14 +3,20 @@
 import numpy as np
 import pytest
 
-from mbf_abstract.geometry import Path
+from mbf_abstract.geometry import Path, quaternion_from_yaw
 from mbf_abstract.geometry.arithmetic import arctan2, plane_rotation, rotated
 from mbf_abstract.geometry.polyline import polyline_lengths
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
-from mbf_costmap_nav.kernels.map.path_poses import course_along, first_off_grid, headed_poses, level_path
+from mbf_costmap_nav.kernels.map.path_poses import (
+    course_along,
+    first_off_grid,
+    headed_poses,
+    level_path,
+    yaw_quaternions,
+)
 from mbf_costmap_nav.planning.manoeuvres import Manoeuvres
 from mbf_costmap_nav.planning.outline_course import Course
 
@@ -71,6 +77,11 @@ def test_a_level_path_has_the_bytes_of_numpy(heights):
         positions, orientations = level_path(points, *heights)
         same_bytes(positions, expected.positions)
         same_bytes(orientations, expected.orientations)
+
+
+def test_quaternions_of_yaws_have_the_bytes_of_the_geometry():
+    yaws = np.concatenate([np.random.default_rng(2).uniform(-20.0, 20.0, 2000), [0.0, -0.0, np.pi, 1e-300]])
+    same_bytes(yaw_quaternions(yaws), np.array([quaternion_from_yaw(yaw) for yaw in yaws.tolist()]))
 
 
 def test_the_first_lethal_cell_under_a_footprint_is_that_of_numpy():
