@@ -44,11 +44,11 @@ class CarWorkspace:
     def __init__(self) -> None:
         self.from_start, self.from_goal = SearchWorkspace(), SearchWorkspace()
         self._costmap: Costmap | None = None
-        self._grounds: dict[tuple[int, bytes, bytes], Ground] = {}
+        self._grounds: dict[tuple[object, ...], Ground] = {}
 
     def ground(self, costmap: Costmap, unknown: int, *outlines: FloatArray) -> Ground:
         """``ground_of`` a snapshot and samples (n, 2) [m]; the same one for a snapshot whose cells stay."""
-        key = unknown, *(outline.tobytes() for outline in outlines)
+        key: tuple[object, ...] = unknown, *(outline.tobytes() for outline in outlines)
         if costmap is not self._costmap:
             self._costmap, self._grounds = costmap, {}
         if key not in self._grounds or costmap.cells.flags.writeable:
@@ -134,28 +134,28 @@ class CarWorld:
 
         Where the goal is reached, only the costs on the way are known.
         """
-        grid, (first, last) = self.grid, self._cells(start, goal)
+        grid, first, last = self.grid, self._cell(start), self._cell(goal)
         (records, buckets), touched = grid.memory(new_search_memory)
         status, g = search(grid.padded, first, last, 1.0, True, False, grid.token.flag, records, touched, buckets)
         return status == FOUND, g
 
     def field(self, source: Pose) -> NDArray[np.float32]:
         """(n,) cost [cells] of all cells of the padded grid from a pose's cell around what blocks the centre."""
-        grid, (first,) = self.grid, self._cells(source)
+        grid, first = self.grid, self._cell(source)
         (records, buckets), touched = grid.memory(new_search_memory)
         return search(grid.padded, first, -1, 0.0, True, False, grid.token.flag, records, touched, buckets)[1]
 
-    def _cells(self, *poses: Pose) -> tuple[int, ...]:
-        """Flat padded indices of the cells of poses."""
-        return tuple(self.grid.index(self.grid.cell_of(pose)) for pose in poses)
+    def _cell(self, pose: Pose) -> int:
+        """Flat padded index of a pose's cell."""
+        return self.grid.index(self.grid.cell_of(pose))
 
     def drive(
         self, ground: Ground, car: Car, start: Pose, goal: Pose, wanted: Pose, tolerance: float, max_states: int
     ) -> tuple[int, FloatArray, float, int]:
         """Call ``hybrid_search`` with the fields of costs from both ends in the workspace's memory."""
         grid, workspace = self.grid, self.workspace
-        memory = tuple(_field_memory(grid, one) for one in (workspace.from_start, workspace.from_goal))
-        ends, cells = (planar(start), planar(goal)), self._cells(start, goal)
+        memory = _field_memory(grid, workspace.from_start), _field_memory(grid, workspace.from_goal)
+        ends, cells = (planar(start), planar(goal)), (self._cell(start), self._cell(goal))
         flag = grid.token.flag
         answer: tuple[int, FloatArray, float, int] = hybrid_search(
             ground, car, ends, cells, memory, planar(wanted), tolerance, max_states, flag

@@ -17,9 +17,11 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.near_far import IN_FAR, IN_NEAR, UNQUEUED, after, raise_threshold
 
 CANCEL_POLL_INTERVAL = 4096
+_AHEAD = Index(16)  # places of the near list, after which a vertex's edges will have come from memory
 _ROUNDING_MARGIN = 1.0 - 1e-6  # keeps the float32 bound below the float32 path cost
 
 
@@ -99,6 +101,11 @@ def propagate_distances(
                 return False
             vertex = Index(near[head])
             head = after(head, near)
+            if head + _AHEAD < Index(len(near)):
+                ahead = Index(near[head + _AHEAD])  # anything where nothing has been written yet
+                if ahead < Index(len(distances)):
+                    prefetch(graph.neighbours, Index(graph.offsets[ahead]))
+                    prefetch(graph.weights, Index(graph.offsets[ahead]))
             state[vertex] = UNQUEUED
             base = distances[vertex]
             for slot in range(Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])):

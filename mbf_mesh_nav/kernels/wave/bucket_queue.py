@@ -30,7 +30,7 @@ RING = 2048
 BUCKETS_PER_STEP: Any = np.float32(160)
 """Buckets that a step of the wave crosses; with so many, few entries share one."""
 EMPTY = -1
-_MASK: Any = Index(RING - 1)
+BUCKET_MASK: Any = Index(RING - 1)
 _ITEM_BITS: Any = Index(32)
 _ITEM_MASK: Any = Index(0xFFFFFFFF)
 
@@ -86,8 +86,8 @@ def next_bucket(
     while near_size == Index(0) and empty < RING:
         bucket += 1
         empty += 1
-        waiting = heads[Index(bucket) & _MASK]
-        heads[Index(bucket) & _MASK] = EMPTY
+        waiting = heads[Index(bucket) & BUCKET_MASK]
+        heads[Index(bucket) & BUCKET_MASK] = EMPTY
         while waiting != EMPTY:
             following, place = links[waiting], Count(key_of(entries[waiting]) * inverse_width)
             if place <= bucket:
@@ -131,7 +131,7 @@ def _go_to_least(
 @inner_kernel
 def _link(heads: IntArray, links: IntArray, number: int, place: int) -> None:
     """Put an entry at the head of a bucket's list."""
-    slot = Index(place) & _MASK
+    slot = Index(place) & BUCKET_MASK
     links[number] = heads[slot]
     heads[slot] = number
 

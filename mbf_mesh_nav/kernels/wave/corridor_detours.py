@@ -11,8 +11,9 @@ from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, kernel
 from mbf_mesh_nav.kernels.mesh.corners import corner_of
 from mbf_mesh_nav.kernels.mesh.vectors import Vector
+from mbf_mesh_nav.kernels.wave.corridor_windows import faces_round, path_length, turned_corridor
 from mbf_mesh_nav.kernels.wave.corridors import FreeFaces
-from mbf_mesh_nav.kernels.wave.straight_corridors import other_side, path_length, straighten, turned_corridor
+from mbf_mesh_nav.kernels.wave.straight_corridors import other_side, straighten
 
 _SHORTER = 1.0 - 1e-6
 """Only what makes a path shorter by more than rounding is another path."""
@@ -24,7 +25,7 @@ def pass_vertices(mesh: FreeFaces, corridor: IntArray, start: Vector, goal: Vect
     """Shortest geodesic that vertices passed on their other side lead to; arguments and result of ``straighten``."""
     may_turn = bool(Count(1))  # a plain True makes numba compile ``straighten`` for this constant, too
     points, corridor = straighten(mesh, corridor, start, goal, may_turn)
-    length, index, tries = path_length(points), Count(0), _MAX_TRIES_A_FACE * len(corridor)
+    length, index, tries = path_length(points, Count(0), len(corridor)), Count(0), _MAX_TRIES_A_FACE * len(corridor)
     while index < len(corridor) - 1 and tries > 0:
         is_shorter = False
         for corner in range(3):
@@ -40,10 +41,12 @@ def pass_vertices(mesh: FreeFaces, corridor: IntArray, start: Vector, goal: Vect
             if side < 0:
                 continue
             tries -= 1
-            other = turned_corridor(mesh, corridor, vertex, index, last, side)
+            fan = faces_round(mesh, corridor, vertex, index, last, side)
+            other = turned_corridor(corridor, fan, index, last)
             found, found_corridor = straighten(mesh, other, start, goal, may_turn)
-            if path_length(found) < _SHORTER * length:
-                points, corridor, length, is_shorter = found, found_corridor, path_length(found), True
+            found_length = path_length(found, Count(0), len(found_corridor))
+            if found_length < _SHORTER * length:
+                points, corridor, length, is_shorter = found, found_corridor, found_length, True
                 break
         index = Count(0) if is_shorter else index + 1
     return points, corridor

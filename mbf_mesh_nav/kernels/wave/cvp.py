@@ -30,8 +30,10 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, kernel
+from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 from mbf_mesh_nav.kernels.wave.bucket_queue import (
+    BUCKET_MASK,
     BUCKETS_PER_STEP,
     EMPTY,
     RING,
@@ -45,6 +47,8 @@ from mbf_mesh_nav.kernels.wave.bucket_queue import (
 from mbf_mesh_nav.kernels.wave.fronts import NO_BEND, distance_where_fronts_meet, is_obtuse, unfolded_distance
 
 ALONG_EDGE = -1
+LARGE = 50_000  # vertices; of smaller meshes the caches hold all
+LAST: Any = Index(5)  # of the records of most vertices, which are six; asking for what lies behind the end does no harm
 _FREE, _SETTLED = 0, 3
 _ONE_FREE, _ALL_SETTLED = 3, 6  # sums of the states of the two other corners; no other pairs have them
 _ZERO: Any = np.float32(0)
@@ -114,12 +118,20 @@ def propagate_wave(
         entry = entry_of(distances[seed], Index(seed))
         used, near_size = put(heads, links, entries, near, used, near_size, bucket, inverse_width, entry)
         state[seed] = _SETTLED  # their distances are exact from the start
-    limit = np.float32(np.inf)
+    limit, is_large = np.float32(np.inf), len(distances) > LARGE
     pops, targets_settled = 0, 0
     while True:
         # 2. The vertex with the least distance is settled; entries from before it was lowered are dropped.
         if near_size == Index(0):
             bucket, near_size = next_bucket(heads, links, entries, near, bucket, inverse_width)
+            # Those of the bucket behind it have their faces come from memory meanwhile.
+            waiting = heads[Index(bucket + 1) & BUCKET_MASK] if is_large else EMPTY
+            while waiting != EMPTY:
+                ahead = Index(vertex_face_offsets[item_of(entries[waiting])])
+                prefetch(corner_ends, ahead)
+                prefetch(corner_weights, ahead)
+                prefetch(corner_weights, ahead + LAST)
+                waiting = links[waiting]
         if near_size == Index(0) or key_of(near[0]) > limit:
             return pops
         vertex, key = item_of(near[0]), key_of(near[0])

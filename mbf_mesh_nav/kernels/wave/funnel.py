@@ -12,7 +12,10 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
-from mbf_mesh_nav.kernels.mesh.vectors import Vector, between, difference, dot, row, set_row
+from mbf_mesh_nav.kernels.mesh.vectors import Vector, between, difference, dot, norm, row, set_row
+
+_AT_VERTEX = 1e-7  # m; a crossing this near to the end of a portal is that vertex
+_NEAR_END = 1e-3  # share of a portal; farther from its ends no crossing is one of them
 
 FlatPoint = tuple[float, float]
 """A point of the unfolded corridor."""
@@ -34,6 +37,17 @@ def pull_string(vertices: FloatArray, faces: IntArray, corridor: IntArray, start
     -------
     (n + 1, 3) float64
         Start, one point on each crossed edge, goal.
+    """
+    return pull_marked(vertices, faces, corridor, start, goal)[0]
+
+
+@kernel
+def pull_marked(
+    vertices: FloatArray, faces: IntArray, corridor: IntArray, start: Vector, goal: Vector
+) -> tuple[FloatArray, IntArray]:
+    """``pull_string``, and (n + 1,) int32 the vertex that each of its points is; -1 where it is none.
+
+    Start and goal, which lie anywhere, are marked as none.
     """
     portal_count = len(corridor) - 1
     portals = np.empty((portal_count, 2), dtype=np.int32)  # vertices at the left and right end
@@ -76,11 +90,12 @@ def pull_string(vertices: FloatArray, faces: IntArray, corridor: IntArray, start
             left_portal, right_portal = index, index
         index += 1
     bends[bend_count, 0], bends[bend_count, 1], bend_portals[bend_count] = target[0], target[1], portal_count
-    points = np.empty((portal_count + 2, 3), dtype=np.float64)
+    points, marks = np.empty((portal_count + 2, 3), dtype=np.float64), np.empty(portal_count + 2, dtype=np.int32)
     set_row(points, Count(0), start)
     set_row(points, Count(portal_count + 1), goal)
-    _cross_portals(vertices, portals, flat_portals, bends, bend_portals, bend_count, points)
-    return points
+    marks[0] = marks[portal_count + 1] = -1
+    _cross_portals(vertices, portals, flat_portals, bends, bend_portals, bend_count, points, marks)
+    return points, marks
 
 
 @inner_kernel
@@ -168,8 +183,12 @@ def _cross_portals(
     bend_portals: IntArray,
     last_bend: int,
     points: FloatArray,
+    marks: IntArray,
 ) -> None:
-    """Write the points where the string, straight between its bends, crosses the portals; portal i to row i + 1."""
+    """Write the points where the string, straight between its bends, crosses the portals; portal i to row i + 1.
+
+    Their marks are the vertices that they are.
+    """
     segment = 0
     for i in range(len(portals)):
         while segment + 1 < last_bend and bend_portals[segment + 1] < i:
@@ -186,3 +205,8 @@ def _cross_portals(
             share = min(max(from_right / spread, 0.0), 1.0)
         crossing = between(row(vertices, Count(portals[i, 1])), row(vertices, Count(portals[i, 0])), share)
         set_row(points, Count(i + 1), crossing)
+        marks[i + 1] = -1
+        if share < _NEAR_END or share > 1.0 - _NEAR_END:
+            end = Count(portals[i, 1] if share < _NEAR_END else portals[i, 0])
+            if norm(difference(row(vertices, end), crossing)) < _AT_VERTEX:
+                marks[i + 1] = end

@@ -10,7 +10,7 @@ import trimesh
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
 from mbf_mesh_nav.kernels.mesh.corners import build_corner_ends, write_corner_weights
-from mbf_mesh_nav.kernels.wave.cvp import propagate_wave
+from mbf_mesh_nav.kernels.wave.cvp import LARGE, propagate_wave
 from mbf_mesh_nav.kernels.wave.fronts import unfolded_distance
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
@@ -184,6 +184,14 @@ def test_the_wave_equals_its_slow_twin_on_rough_weighted_ground(seed):
     np.testing.assert_allclose(fast, slow, rtol=2e-5, atol=1e-6)
     led = np.setdiff1d(np.arange(len(fast)), seeds)
     assert (fast[predecessors[led]] < fast[led]).all()  # predecessors lead to the source, whatever the corners' angles
+
+
+def test_on_a_mesh_larger_than_the_caches_distances_on_a_plane_are_exact():
+    mesh_map = MeshMap.from_heights(np.zeros((225, 225)), 0.5, 0.5)
+    assert len(mesh_map.vertices) > LARGE
+    distances, *_ = wave_from_vertex(mesh_map, 30_000)
+    straight = np.linalg.norm(mesh_map.vertices - mesh_map.vertices[30_000], axis=1)
+    np.testing.assert_allclose(distances, straight, rtol=1e-4, atol=1e-6)
 
 
 def test_the_field_does_not_depend_on_the_queues_buckets_but_near_the_source(shared_data):
