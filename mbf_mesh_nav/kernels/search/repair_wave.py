@@ -13,8 +13,10 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
+from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph
 
+_AHEAD: Any = Index(16)  # places of a list, after which a vertex's edges will have come from memory
 _RESET: Any = np.uint8(1)
 _SEED: Any = np.uint8(2)
 
@@ -60,6 +62,9 @@ def invalidate_subtrees(
     while reader < count:
         vertex = Index(reset[reader])
         reader += ONE
+        if reader + _AHEAD < count:
+            ahead = Index(graph.offsets[reset[reader + _AHEAD]])
+            prefetch(graph.neighbours, ahead)
         distances[vertex] = np.inf
         predecessors[vertex] = -1
         for slot in range(Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])):
@@ -78,6 +83,9 @@ def invalidate_subtrees(
     # 2. The wave starts again from what is intact around them.
     for index in range(count):
         vertex = Index(reset[index])
+        if index + _AHEAD < count:
+            ahead = Index(graph.offsets[reset[index + _AHEAD]])
+            prefetch(graph.neighbours, ahead)
         for slot in range(Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])):
             other = Index(graph.neighbours[slot])
             if state[other] == 0 and distances[other] < np.inf:
