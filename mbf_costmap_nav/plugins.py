@@ -27,6 +27,8 @@ class CostmapContext(MapContext[LayeredCostmap]):
 class _OnCostmaps(MapPlugin):
     """Keeps the maps of the context by their types; mixed into the four interfaces."""
 
+    map_type = LayeredCostmap
+
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)
         self.costmap = context.navigation_map

@@ -70,6 +70,7 @@ class CostmapNavigationServer(MapServer):
     """Navigation on a global and a local costmap."""
 
     backend: ClassVar[str] = "costmap"
+    map_type = LayeredCostmap
     plugin_declaration: ClassVar[type[PluginDeclaration]] = CostmapPluginDeclaration
     plugin_adapters: ClassVar[Sequence[Adapter]] = (wrap_nav_core,)
     config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {

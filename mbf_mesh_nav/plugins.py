@@ -23,6 +23,8 @@ class MeshContext(MapContext[MeshMap]):
 class MeshPlugin(MapPlugin):
     """Common part of the mesh interfaces: keeps the map of the context by its type."""
 
+    map_type = MeshMap
+
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
         self.mesh_map = context.navigation_map

@@ -74,6 +74,7 @@ class MeshNavigationServer(MapServer):
     """Navigation on one triangle mesh."""
 
     backend: ClassVar[str] = "mesh"
+    map_type = MeshMap
     config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {"mesh_map": MeshMapParameters}
 
     read_mesh = staticmethod(read_mesh)

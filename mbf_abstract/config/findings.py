@@ -73,7 +73,7 @@ def describe_value(value: object) -> str:
         return "nothing"
     if isinstance(value, dict):
         return f"a block of {len(value)} keys"
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return f"a list of {len(value)} items"
     text = repr(value)
     return text if len(text) <= _GOT_WIDTH else text[: _GOT_WIDTH - 3] + "..."

@@ -124,7 +124,7 @@ def _location_in_data(block: object, error: ErrorDetails) -> KeyPath:
     """Return pydantic's location without the parts that name alternatives of a union, which are not in the data."""
     loc: KeyPath = ()
     for part in error["loc"]:
-        known = range(len(block)) if isinstance(block, list) else block if isinstance(block, dict) else ()
+        known = range(len(block)) if isinstance(block, list | tuple) else block if isinstance(block, dict) else ()
         if part in known:
             loc = (*loc, part)
             block = block[part]  # type: ignore[index]

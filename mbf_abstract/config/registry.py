@@ -49,12 +49,22 @@ class PluginRegistry:
         Whether ``module:Class`` may import any module of the Python path. Switch it off for untrusted configurations.
     adapters : iterable of Adapter
         Asked, in order, about a class that does not derive from the interface of its group.
+    misfit : callable, optional
+        Why a class cannot be used on this backend, whatever it derives from; empty if it can.
     """
 
-    def __init__(self, backend: str = "", *, allow_module_types: bool = True, adapters: Iterable[Adapter] = ()) -> None:
+    def __init__(
+        self,
+        backend: str = "",
+        *,
+        allow_module_types: bool = True,
+        adapters: Iterable[Adapter] = (),
+        misfit: Callable[[type], str] = lambda _: "",
+    ) -> None:
         self.backend = backend
         self.allow_module_types = allow_module_types
         self.adapters = list(adapters)
+        self._misfit = misfit
         self._registered: dict[tuple[str, str], type] = {}
         self._found: dict[str, dict[str, list[EntryPoint]]] = {}
 
@@ -168,6 +178,8 @@ class PluginRegistry:
         if issubclass(plugin_class, expected):
             if missing := sorted(getattr(plugin_class, "__abstractmethods__", ())):
                 raise PluginError(group, type_name, f"does not implement {', '.join(missing)}")
+            if reason := self._misfit(plugin_class):
+                raise PluginError(group, type_name, reason)
             return plugin_class
         for adapter in self.adapters:
             adapted = adapter(group, plugin_class)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
@@ -39,9 +39,20 @@ class MapContext(PluginContext, Generic[M]):
 
 
 class MapPlugin(Plugin):
-    """Keeps the maps of the context; mixed into the plugin interfaces."""
+    """Keeps the maps of the context; mixed into the plugin interfaces.
+
+    Raises
+    ------
+    ValueError
+        The map is not of ``map_type``.
+    """
+
+    map_type: ClassVar[type | None] = None
+    """The map it needs; a server whose map is another one refuses it. None = any map."""
 
     def __init__(self, context: MapContext[Any]) -> None:
+        if misfit := needs_another_map(type(self), type(context.navigation_map)):
+            raise ValueError(misfit)
         super().__init__(context)
         self.navigation_map: NavigationMap = context.navigation_map
         self.maps: Mapping[str, NavigationMap] = context.maps
@@ -51,3 +62,14 @@ class MapPlugin(Plugin):
     def on_map(self, pose: Pose, navigation_map: NavigationMap | None = None) -> Pose:
         """Express a pose in the frame of a map, the plugin's own if none is given; raises TransformError."""
         return self.transforms.transform_pose(pose, (navigation_map or self.navigation_map).frame_id)
+
+
+def needs_another_map(plugin_class: object, map_type: type | None) -> str:
+    """Why a plugin class cannot be used on a map; empty if it can, or if one of them does not say what it is."""
+    needed = getattr(plugin_class, "map_type", None)
+    if needed is None or map_type is None or issubclass(map_type, needed):
+        return ""
+    name = getattr(plugin_class, "__qualname__", plugin_class)
+    return (
+        f"class {name} needs a {needed.__name__} ({needed.__module__}), the map of the server is a {map_type.__name__}"
+    )

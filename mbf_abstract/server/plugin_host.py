@@ -21,6 +21,7 @@ from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.maps.map_plugin import needs_another_map
 from mbf_abstract.parameters import checked_parameters, with_changes
 from mbf_abstract.plugins import Plugin, PluginContext, PluginKind
 from mbf_abstract.server.plugin_table import PluginTable
@@ -35,10 +36,14 @@ class PluginHost(ABC):
 
     backend: ClassVar[str]
     """Prefix of this server's plugin types, e.g. ``mesh``."""
+    plugin_prefix: ClassVar[str] = ""
+    """Prefix of its plugin types where that is not the backend's name."""
     plugin_declaration: ClassVar[type[PluginDeclaration]] = PluginDeclaration
     """Items of the plugin lists, with the options this server knows."""
     plugin_adapters: ClassVar[Sequence[Adapter]] = ()
     """Asked about a class that is no MBF plugin, e.g. to wrap a nav_core-style one."""
+    map_type: ClassVar[type | None] = None
+    """What its plugins are given as a map, so that a configuration's can be checked; None = not known before it is."""
 
     def __init__(self, runtime: Runtime, seed: int) -> None:
         self.runtime = runtime
@@ -52,7 +57,17 @@ class PluginHost(ABC):
     @classmethod
     def plugin_registry(cls, allow_module_types: bool = True) -> PluginRegistry:
         """Registry of this server's plugin types."""
-        return PluginRegistry(cls.backend, allow_module_types=allow_module_types, adapters=cls.plugin_adapters)
+        return PluginRegistry(
+            cls.plugin_prefix or cls.backend,
+            allow_module_types=allow_module_types,
+            adapters=cls.plugin_adapters,
+            misfit=cls.plugin_misfit,
+        )
+
+    @classmethod
+    def plugin_misfit(cls, plugin_class: type) -> str:
+        """Why a plugin class cannot be used on the server's map; empty if it can, or if that is not known yet."""
+        return needs_another_map(plugin_class, cls.map_type)
 
     def load_plugin(self, spec: PluginSpec) -> None:
         """Construct and add a plugin; raises ServerError with the reason if its constructor fails."""

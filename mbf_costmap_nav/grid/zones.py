@@ -15,34 +15,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import field_validator
 
 from mbf_abstract.config.findings import Finding
 from mbf_abstract.config.validation import validate
 from mbf_abstract.geometry.polygon import inside_polygon
+from mbf_abstract.maps.layers.drawn_area import DrawnArea
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_costmap_nav.files.map_description import MapError, findings_text, read_mapping
 
 
-class Zone(ParameterModel):
+class Zone(DrawnArea):
     """One polygon."""
 
-    name: str = parameter(..., "Name for messages.")
-    polygon: tuple[tuple[float, float], ...] = parameter(..., "Corners in order, at least three.", unit="m")
     speed_limit: float | None = parameter(None, "Limit inside, for the speed-limit layer.", ge=0.0)
-
-    @field_validator("polygon")
-    @classmethod
-    def _is_an_area(cls, corners: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-        if len(corners) < 3:
-            raise ValueError(f"a polygon of at least 3 corners, not of {len(corners)}")
-        return corners
-
-    @property
-    def corners(self) -> NDArray[np.float64]:
-        """Corners (n, 2) [m]."""
-        return np.array(self.polygon, dtype=np.float64)
 
     def contains(self, x: float, y: float) -> bool:
         """Whether the point (x, y) [m] lies inside."""

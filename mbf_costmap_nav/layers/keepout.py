@@ -46,15 +46,19 @@ class KeepoutLayer(AreaLayer):
         if not self.placement.known:
             return ""
         there = self.placement.to_data(np.array([[x, y]]))[0].tolist()
-        zone = next((zone for zone in self.zones if zone.contains(*there)), None)
-        if zone is not None:
-            return f"zone {zone.name!r}"
+        for index, zone in enumerate(self.zones):
+            if zone.contains(*there):
+                return f"zone {zone.title('zones', index)}"
         return "the mask" if self._costs is not None else "the edge of a zone"
 
     @property
     def permanent(self) -> bool:
         """Whether its areas are in the costmap's frame."""
         return self.placement.in_costmap_frame
+
+    def parameters_changed(self) -> None:
+        """Paint the zones as they are now."""
+        self._paint()
 
     def match_geometry(self, geometry: GridGeometry) -> None:
         """Paint the areas onto the grid."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_abstract.config.bounded_files import configured_file
-from mbf_abstract.geometry.polygon import area_warning
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.files.map_io import load_map
@@ -20,7 +19,7 @@ from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext
 class AreaLayerParameters(LayerParameters):
     """Where the areas of a layer come from."""
 
-    zones: tuple[Zone, ...] = parameter((), "Polygons written in place.", dynamic=False)
+    zones: tuple[Zone, ...] = parameter((), "Polygons written in place; those of the file stay when they change.")
     zones_file: str = parameter("", "YAML file with more polygons.", dynamic=False)
     mask_file: str = parameter("", "map_server YAML file of a mask image.", dynamic=False)
     map_frame: str = parameter("", "Frame of zones and mask; empty = the costmap's.", dynamic=False)
@@ -31,8 +30,6 @@ class AreaLayer(CostmapLayer):
 
     Attributes
     ----------
-    zones : tuple of Zone
-        Polygons of the configuration and of the zones file.
     mask : OccupancyMap or None
         Content of the mask image, with axes parallel to its frame.
     placement : Placement
@@ -45,18 +42,23 @@ class AreaLayer(CostmapLayer):
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
         p, folder, limit = self.parameters, context.base_folder, context.max_cells
-        self.zones = p.zones + (load_zones(configured_file(folder, p.zones_file)) if p.zones_file else ())
+        self._zones_of_file = load_zones(configured_file(folder, p.zones_file)) if p.zones_file else ()
         self.mask = None
         if p.mask_file:
             mask_file = configured_file(folder, p.mask_file)
             self.mask = load_map(mask_file, limit, confined=context.confine_images).axis_aligned(limit)
         self.placement = Placement(p.map_frame, context)
 
+    @property
+    def zones(self) -> tuple[Zone, ...]:
+        """Polygons of the configuration, as they are now, and of the zones file."""
+        return self.parameters.zones + self._zones_of_file
+
     def configuration_warning(self) -> str:
         """The first zone that is hardly meant as it is: its polygon, its limit, or its place."""
-        for zone in self.zones:
-            if problem := area_warning(zone.corners) or self.zone_warning(zone) or self._off_grid(zone):
-                return f"zone {zone.name!r}: {problem}"
+        for index, zone in enumerate(self.zones):
+            if problem := zone.warning() or self.zone_warning(zone) or self._off_grid(zone):
+                return f"zone {zone.title('zones', index)}: {problem}"
         return ""
 
     def zone_warning(self, zone: Zone) -> str:

@@ -30,16 +30,18 @@ class KeepoutLayer(MeshLayer):
         mesh = self.topology
         for index, region in enumerate(self.parameters.regions):
             if problem := region.warning():
-                return f"regions[{index}]: {problem}"
+                return f"{region.title('regions', index)}: {problem}"
             if not region.closed_mask(mesh.vertices, mesh.edges, mesh.faces).any():
-                return f"regions[{index}]: there is no ground in it, at its heights"
+                return f"{region.title('regions', index)}: there is no ground in it, at its heights"
         return ""
 
     def lethal_reason(self, vertex: int) -> str:
         """The region that closes it."""
         mesh, regions = self.topology, self.parameters.regions
-        closing = (k for k, one in enumerate(regions) if one.closed_mask(mesh.vertices, mesh.edges, mesh.faces)[vertex])
-        return next((f"regions[{index}]" for index in closing), "")
+        for index, region in enumerate(regions):
+            if region.closed_mask(mesh.vertices, mesh.edges, mesh.faces)[vertex]:
+                return region.title("regions", index)
+        return ""
 
     @classmethod
     def reach(cls, parameters: KeepoutParameters) -> float:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from pydantic import field_validator, model_validator
+from pydantic import model_validator
 
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
-from mbf_abstract.geometry.polygon import area_warning, inside_polygon
-from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.geometry.polygon import inside_polygon
+from mbf_abstract.maps.layers.drawn_area import DrawnArea
+from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.map.layer import LethalArray
 
@@ -17,19 +18,11 @@ CORNER_SHARE = 1e-6
 """Distance of a probe point from its corner, in lengths of the side."""
 
 
-class Region(ParameterModel):
+class Region(DrawnArea):
     """A polygon on one storey."""
 
-    polygon: tuple[tuple[float, float], ...] = parameter(..., "Corners (x, y) in the map's frame.", unit="m")
     z_min: float = parameter(-np.inf, "Lowest height the region applies to.", unit="m", allow_inf=True)
     z_max: float = parameter(np.inf, "Greatest height the region applies to.", unit="m", allow_inf=True)
-
-    @field_validator("polygon")
-    @classmethod
-    def _has_an_inside(cls, polygon: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-        if len(polygon) < 3:
-            raise ValueError(f"a polygon of at least 3 corners, not of {len(polygon)}")
-        return polygon
 
     @model_validator(mode="after")
     def _has_a_height(self) -> Region:
@@ -37,13 +30,9 @@ class Region(ParameterModel):
             raise ValueError(f"a range of heights: z_min {self.z_min:g} m is above z_max {self.z_max:g} m")
         return self
 
-    def warning(self) -> str:
-        """What of the polygon is hardly meant; empty if nothing is."""
-        return area_warning(np.array(self.polygon, dtype=np.float64))
-
     def mask(self, vertices: FloatArray) -> LethalArray:
         """Mask (V,) of the vertices (V, 3) inside, corners on the outline included by the even-odd rule."""
-        inside = inside_polygon(vertices, np.array(self.polygon, dtype=np.float64))
+        inside = inside_polygon(vertices, self.corners)
         return np.asarray(inside & self._within_heights(vertices))
 
     def closed_mask(self, vertices: FloatArray, edges: IntArray, faces: IntArray) -> LethalArray:
@@ -52,7 +41,7 @@ class Region(ParameterModel):
         All vertices on the outline are added, both ends of an edge (E, 2) that crosses the outline without an end
         inside, and the corners of a face (F, 3) into which a corner of the polygon leads.
         """
-        outline = np.array(self.polygon, dtype=np.float64)
+        outline = self.corners
         mask = self.mask(vertices) | (_on_outline(vertices, outline) & self._within_heights(vertices))
         low, high = outline.min(axis=0), outline.max(axis=0)
         flat, at_height = vertices[:, :2], self._within_heights(vertices)

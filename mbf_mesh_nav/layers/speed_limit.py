@@ -47,8 +47,10 @@ class SpeedLimitLayer(MeshLayer):
 
     def configuration_warning(self) -> str:
         """The first region whose polygon is hardly meant as it is."""
-        problems = ((index, region.warning()) for index, region in enumerate(self.parameters.regions))
-        return next((f"regions[{index}]: {problem}" for index, problem in problems if problem), "")
+        for index, region in enumerate(self.parameters.regions):
+            if problem := region.warning():
+                return f"{region.title('regions', index)}: {problem}"
+        return ""
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """No cost and nothing lethal."""

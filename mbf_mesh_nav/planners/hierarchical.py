@@ -66,12 +66,11 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
     """Plans over portals, then along edges."""
 
     Parameters: ClassVar[type[PluginParameters]] = HierarchicalParameters
+    map_type = TiledNavigationMap
     parameters: HierarchicalParameters
 
     def __init__(self, context: MapContext[TiledNavigationMap]) -> None:
         super().__init__(context)
-        if not isinstance(context.navigation_map, TiledNavigationMap):
-            raise ValueError("plans on a map of tiles, which the configuration's backend does not have")
         self._map = context.navigation_map
         self._tiled = context.navigation_map.tiled
         self._last: CorridorField | None = None

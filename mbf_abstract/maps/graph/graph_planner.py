@@ -15,7 +15,7 @@ from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.goals.arrival_tolerance import ends_beside, not_even_beside
 from mbf_abstract.maps.getting_free import getting_free
 from mbf_abstract.maps.graph.graph_map import BoolArray, GraphMap
-from mbf_abstract.maps.map_plugin import MapContext
+from mbf_abstract.maps.map_plugin import MapContext, MapPlugin
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult
@@ -24,8 +24,10 @@ OFF_GROUND = 0.5
 """A pose farther above or below the ground [m] is not on it."""
 
 
-class GraphPlanner(AbstractPlanner):
+class GraphPlanner(MapPlugin, AbstractPlanner):
     """Finds the cheapest path over the graph; costs lengthen its edges."""
+
+    map_type = GraphMap
 
     def __init__(self, context: MapContext[GraphMap]) -> None:
         super().__init__(context)

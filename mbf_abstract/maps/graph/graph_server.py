@@ -28,6 +28,7 @@ UPDATE_FREQUENCY = 10.0  # Hz
 class GraphMapServer(MapServer):
     """A server with one map that is a graph, in the first of its ``config_sections``; write ``make_map``."""
 
+    map_type = GraphMap
     navigation_map: GraphMap
 
     @abstractmethod

@@ -18,7 +18,6 @@ from typing import Any, ClassVar, cast
 
 from mbf_abstract.config.bounded_files import configured_file
 from mbf_abstract.config.configuration import Config, PluginSpec
-from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.maps.map_plugin import MapContext
@@ -27,7 +26,6 @@ from mbf_abstract.maps.view import GridView
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.server.map_server import MapServer
-from mbf_abstract.server.plugin_host import ServerError
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.robot_outline import OutlineParameters, changes_of_radius
@@ -107,6 +105,8 @@ class TileServer(MapServer):
     """Navigation on a map larger than memory."""
 
     backend: ClassVar[str] = "tiles"
+    plugin_prefix: ClassVar[str] = "mesh"
+    map_type = TiledNavigationMap
     config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {"tiled_map": TiledMapParameters}
 
     @property
@@ -116,9 +116,13 @@ class TileServer(MapServer):
         return tiled_map
 
     @classmethod
-    def plugin_registry(cls, allow_module_types: bool = True) -> PluginRegistry:
-        """Types are those of the mesh server."""
-        return PluginRegistry("mesh", allow_module_types=allow_module_types, adapters=cls.plugin_adapters)
+    def plugin_misfit(cls, plugin_class: type) -> str:
+        """Plugins for one mesh that look at a part of it can be used, too."""
+        if issubclass(plugin_class, tuple(ON_TILES)):
+            return ""
+        if issubclass(plugin_class, MeshPlugin):
+            return f"class {plugin_class.__qualname__} needs the whole mesh in memory, which a map of tiles is not"
+        return super().plugin_misfit(plugin_class)
 
     def serve_maps(self, config: Config) -> Iterator[ServedMap[Any]]:
         """Open the folder."""
@@ -171,8 +175,6 @@ class TileServer(MapServer):
                 loaded = super()._construct(replace(spec, plugin_class=wrapped))
                 loaded.spec = spec
                 return loaded
-        if issubclass(spec.plugin_class, MeshPlugin):
-            raise ServerError("needs the whole mesh in memory, which a map of tiles is not")
         return super()._construct(spec)
 
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:

@@ -168,7 +168,7 @@ def test_a_robot_too_large_for_the_inflation_is_reported(site):
         ),
         (lambda s: s.set_layer_parameters("global_costmap.around", radius=1.0), ValueError, "radius"),
         (lambda s: s.set_layer_parameters("global_costmap.around", inflation_radius=90.0), ValueError, "900 cells"),
-        (lambda s: s.set_layer_parameters("global_costmap.zone", zones=()), ValueError, "zones: read once"),
+        (lambda s: s.set_layer_parameters("global_costmap.zone", mask_file="a"), ValueError, "mask_file: read once"),
         (lambda s: s.set_layer_parameters("round", enabled=False), ServerError, "no layer 'round'; known.*'?around"),
         (lambda s: s.set_layer_parameters("around", enabled=False), ServerError, "several maps have a layer 'around'"),
         (lambda s: s.set_map_parameters("global_costmap", resolution=0.2), ValueError, "resolution: read once"),

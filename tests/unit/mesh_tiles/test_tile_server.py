@@ -7,6 +7,7 @@ import pytest
 from test_tile_planning import ROUNDING, build_storeys
 from tiled_terrains import SPACING, WholeMap, settings, terrain
 
+from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.maps.map_plugin import MapContext
@@ -252,12 +253,12 @@ def test_a_folder_in_a_home_that_is_not_known_is_no_folder_of_tiles(tmp_path):
 
 def test_planners_for_one_mesh_are_refused_at_the_start(tiled_hills, tmp_path):
     text = config(tiled_hills).replace("tiles.hierarchical", "cvp")
-    with LoopbackSession(Pose.planar(0.0, 0.0)) as session, pytest.raises(ServerError, match="needs the whole mesh"):
+    with LoopbackSession(Pose.planar(0.0, 0.0)) as session, pytest.raises(ConfigError, match="needs the whole mesh"):
         serve(session, tmp_path, text)
 
 
 def test_the_planner_is_refused_on_another_map(whole_hills):
-    with pytest.raises(ValueError, match="plans on a map of tiles"):
+    with pytest.raises(ValueError, match=r"HierarchicalPlanner needs a TiledNavigationMap .*, .* is a MeshMap"):
         planned(HierarchicalPlanner, whole_hills.map)
 
 
