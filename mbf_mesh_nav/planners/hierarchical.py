@@ -33,6 +33,7 @@ from mbf_mesh_nav.search.leg_search import Leg
 from mbf_mesh_nav.search.surface_planner import failure_of_leg, named_poses, path_of_legs
 from mbf_mesh_nav.tiles.places import TilePlace
 from mbf_mesh_nav.tiles.planning import SURFACE_DISTANCE, TOLERANCE, place_on_tiles, plan_between
+from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED
 from mbf_mesh_nav.tiles.serving.corridor_field import CorridorField
 from mbf_mesh_nav.tiles.serving.moment import Moment
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
@@ -41,6 +42,10 @@ from mbf_mesh_nav.tiles.tiled_plan import TiledPlan
 
 AT_VERTEX = 1e-6
 """How far [m] a vertex may be from itself on the surface: rounding."""
+
+STAYING = (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_GOAL)
+"""Outcomes that planning again cannot change where no sensor has a part in them."""
+STORED = "so it is without what sensors see"
 
 
 class HierarchicalParameters(PluginParameters):
@@ -89,11 +94,26 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
             with self._map.turn_to_search(request.cancel_token.flag) as moment:
                 if moment is None:
                     return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
-                return self._planned(request, moment)
+                result = self._planned(request, moment, self.parameters.repair)
+                return self._judged(result, request, moment)
         except MeshError as error:
             return PlanResult(GetPathOutcome.MAP_ERROR, str(error))
 
-    def _planned(self, request: PlanRequest, moment: Moment) -> PlanResult:
+    def _judged(self, result: PlanResult, request: PlanRequest, moment: Moment) -> PlanResult:
+        """A result; a failure that the stored map alone gives, too, is permanent: no sensor opens what is stored."""
+        stays = result.outcome in STAYING and not result.permanent
+        if not stays or not self._map.senses or request.cancel_token.cancelled:
+            return result
+        self._tiled.lay_over(NOTHING_SENSED)
+        try:
+            stored = self._planned(request, self._map.moment(sensed=False), keeps=False)
+        finally:
+            self._tiled.lay_over(moment.sensed)
+        if stored.outcome not in STAYING:
+            return result
+        return replace(result, message=f"{result.message}; {STORED}", permanent=True)
+
+    def _planned(self, request: PlanRequest, moment: Moment, keeps: bool) -> PlanResult:
         # 1. Where on the surface is everything? A tolerance helps with a problem of the goal only.
         places, problem = self._locate(request, moment)
         if problem is not None and (len(places) <= len(request.via) or request.dist_tolerance <= 0.0):
@@ -102,7 +122,7 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         # 2. Plan leg by leg; the last one may end near the goal instead of at it.
         plans: list[TiledPlan] = []
         flag = request.cancel_token.flag
-        is_kept = self.parameters.repair and len(places) == 2
+        is_kept = keeps and len(places) == 2
         for first, last in itertools.pairwise(places):
             plan = self._plan(first, last, flag, is_kept)
             if plan.outcome != GetPathOutcome.SUCCESS:
@@ -173,8 +193,8 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
 
     def _as_permanent(self, problem: PlanResult) -> PlanResult:
         """A failure that stays on a map that no sensor changes: no way, or a goal that is blocked."""
-        stays = problem.outcome in (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_GOAL)
-        return replace(problem, permanent=problem.permanent or (stays and not self._map.senses))
+        stays = problem.outcome in STAYING and not self._map.senses
+        return replace(problem, permanent=problem.permanent or stays)
 
     def _limited(self, problem: PlanResult | None, request: PlanRequest) -> PlanResult | None:
         """A problem for which no place near the goal helps, with the limit of the tolerance if that was the cause."""

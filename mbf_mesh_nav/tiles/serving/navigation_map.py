@@ -156,9 +156,10 @@ class TiledNavigationMap(TileQuestions):
         index = self.first_outside(places) if len(places) else -1
         return int(lines[index]) if index >= 0 else -1
 
-    def moment(self) -> Moment:
-        """The map as it is now."""
-        return Moment(self._squares, None if self._window is None else self._window.now, self._for_robot)
+    def moment(self, sensed: bool = True) -> Moment:
+        """The map as it is now, or without what sensors have seen."""
+        window = self._window.now if self._window is not None and sensed else None
+        return Moment(self._squares, window, self._for_robot)
 
     @contextmanager
     def turn_to_search(self, cancel_flag: FlagArray = NOT_CANCELLED) -> Iterator[Moment | None]:

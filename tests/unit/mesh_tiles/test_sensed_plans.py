@@ -74,7 +74,8 @@ def test_all_legs_of_a_plan_see_the_map_of_one_moment(tiled_hills, way, monkeypa
     monkeypatch.setattr("mbf_mesh_nav.planners.hierarchical.plan_between", see_something_meanwhile)
     (during, after) = planned(HierarchicalPlanner, tiled, request, request)
     assert during.cost == before.cost and np.array_equal(during.path.positions, before.path.positions)
-    assert after.outcome == GetPathOutcome.BLOCKED_GOAL and len(legs) == 2
+    assert after.outcome == GetPathOutcome.BLOCKED_GOAL
+    assert len(legs) == 4, "two of the second plan ask whether the goal is blocked without what sensors see, too"
 
 
 def test_a_tile_that_changes_keeps_what_was_sensed_on_it(tiled_hills, way, tmp_path):
@@ -131,3 +132,20 @@ def seen_on_tiles(tiled, place):
     near = np.flatnonzero(((vertices - place) ** 2).sum(axis=1) < reach**2)
     values = np.full(len(near), np.inf, dtype=np.float32), np.ones(len(near), dtype=np.bool_)
     return SensedCosts.at(numbers[near], *values, vertices[near])
+
+
+def test_a_goal_that_is_blocked_on_the_stored_map_fails_for_good_and_one_blocked_by_a_sensor_does_not(
+    tiled_hills, whole_hills, way
+):
+    tiled = sensing_map(tiled_hills)
+    tiled.update(pose(way[10]), 0.0)
+    tiled.insert_scan(scan(way[10], way[12][None] + (0.0, 0.0, 0.4), 0.1))
+    tiled.update(pose(way[10]), 0.1)
+    lethal = whole_hills.map.vertices[whole_hills.blocked & (whole_hills.map.vertices[:, 0] > 3.0)]
+    closed = min(lethal, key=lambda place: abs(np.linalg.norm(place - way[10]) - 6.0))
+    stored, sensed = PlanRequest(pose(way[10]), pose(closed)), PlanRequest(pose(way[10]), pose(way[12]))
+    for _ in range(2):  # the search without sensors leaves what they have seen as it is
+        first, second = planned(HierarchicalPlanner, tiled, stored, sensed)
+        assert first.outcome == second.outcome == GetPathOutcome.BLOCKED_GOAL
+        assert first.permanent and "so it is without what sensors see" in first.message
+        assert not second.permanent and "is blocked: lethal in layer obstacles" in second.message
