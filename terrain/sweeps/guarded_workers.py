@@ -3,7 +3,8 @@
 When to use: for jobs that run code of strangers, such as the plugins that an evaluation judges. When not: where a job
 that lost its worker should be done again; see ``terrain.sweeps.worker_pool``.
 
-A worker that dies is replaced, and its job has no result but the reason. A job that takes longer than ``time_limit``
+A worker that dies is replaced, and its job has no result but the reason; one that it had not begun, because it died
+after its last job, is done by another worker. A job that takes longer than ``time_limit``
 ends its worker from a thread of the interpreter's own, which needs no lock of Python: also in a compiled loop without
 an end. A worker in which a job left a thread at work is replaced after it, because that thread would slow down the
 next ones. Jobs may start processes of their own, which end with their worker.
@@ -40,6 +41,11 @@ class Lost:
     reason: str
 
 
+@dataclass(frozen=True)
+class _Begun:
+    """What a worker says before it does a job."""
+
+
 @dataclass
 class _Worker(Generic[J]):
     """A process, the end of the pipe to it, and what it is at."""
@@ -49,10 +55,11 @@ class _Worker(Generic[J]):
     job: J | None = None
     began: float = 0.0
     is_used: bool = False
+    has_begun: bool = False
 
     def take(self, job: J) -> bool:
         """Begin a job; False if the process has died since its last one."""
-        self.job, self.began = job, wall_seconds()
+        self.job, self.began, self.has_begun = job, wall_seconds(), False
         try:
             self.pipe.send(job)
         except OSError:
@@ -109,13 +116,20 @@ def run_guarded(
             busy = [worker for worker in team if worker.job is not None]
             ready = wait([worker.pipe for worker in busy], CHECK)
             for worker in [worker for worker in busy if worker.pipe in ready or not worker.process.is_alive()]:
-                done, worker.job, worker.is_used = worker.job, None, True
-                assert done is not None
                 result, is_fit = _answer(worker, time_limit)
+                if isinstance(result, _Begun):
+                    worker.has_begun = True
+                    continue
+                done, died_before = worker.job, worker.is_used and not worker.has_begun
+                worker.job, worker.is_used = None, True
+                assert done is not None
                 if not is_fit or leaves_traces(done):
                     team.remove(worker)
                     worker.end()
-                yield done, result
+                if died_before:
+                    left.append(done)
+                else:
+                    yield done, result
 
 
 def _end_all(team: Sequence[_Worker[Any]]) -> None:
@@ -158,6 +172,7 @@ def _work(do: Callable[[J], R], pipe: Connection, time_limit: float) -> None:
             job = pipe.recv()
         except EOFError:
             return
+        pipe.send((_Begun(), True))
         faulthandler.dump_traceback_later(time_limit, exit=True)
         before = set(threading.enumerate())
         result = do(job)

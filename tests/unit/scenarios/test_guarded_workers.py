@@ -57,6 +57,46 @@ def test_a_worker_that_dies_between_two_jobs_is_replaced_and_its_next_job_is_don
     assert (job, other) == ("a", "b") and pid != idle
 
 
+class UnpickledByFreshWorkersOnly:
+    """A job that ends a worker which has done another one, while it takes this one from the pipe."""
+
+    has_worked = False
+
+    def __reduce__(self):
+        return unpickled, ()
+
+
+def unpickled():
+    if UnpickledByFreshWorkersOnly.has_worked:
+        os._exit(9)
+    return "b"
+
+
+def note(job):
+    UnpickledByFreshWorkersOnly.has_worked = True
+    return job, os.getpid()
+
+
+def test_a_worker_that_dies_before_it_has_begun_its_next_job_is_replaced_and_that_is_done():
+    (_, first), (_, second) = run_guarded(note, ["a", UnpickledByFreshWorkersOnly()], 1, time_limit=60.0)
+    assert first[0] == "a" and second[0] == "b" and first[1] != second[1]
+
+
+class NeverUnpickled:
+    """A job that ends every worker which takes it."""
+
+    def __reduce__(self):
+        return os._exit, (7,)
+
+
+def test_a_job_that_ends_every_worker_before_it_has_begun_is_lost_and_the_others_are_done():
+    results = [result for _, result in run_guarded(do, ["a", NeverUnpickled(), "b"], 1, time_limit=60.0)]
+    assert sorted(str(one) for one in results if isinstance(one, Lost)) == [
+        "Lost(reason='crashed: the process of the run ended with code 7')"
+    ]
+    assert [one[0] for one in results if not isinstance(one, Lost)] == ["a", "b"]
+
+
 def test_a_job_may_start_processes_and_they_end_with_their_worker():
     """A child holds the worker's end of the pipe: its end alone does not show that the worker has died."""
     results = dict(run_guarded(do, ["child", "child, then crash", "a"], 1, time_limit=60.0))
