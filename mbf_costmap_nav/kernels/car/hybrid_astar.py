@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.car.curves import sample_word
 from mbf_costmap_nav.kernels.car.ground import Ground, driven_cost
-from mbf_costmap_nav.kernels.car.joints import HEADINGS, FloatArray, Joint, Target, heuristic, try_joints
+from mbf_costmap_nav.kernels.car.joints import HEADINGS, FloatArray, Joint, Target, heuristic, new_target, try_joints
 from mbf_costmap_nav.kernels.car.motion_primitives import (
     BACKWARD_SIDE,
     FORWARD_MOTIONS,
@@ -147,8 +147,8 @@ def hybrid_search(
         How many were made.
     """
     (start, goal), (first, last_cell) = ends, cells
-    from_goal = Target(start, new_field(memory[0], first, last_cell, cancel_flag))
-    from_start = Target(goal, new_field(memory[1], last_cell, first, cancel_flag))
+    from_goal = new_target(start, new_field(memory[0], first, last_cell, cancel_flag))
+    from_start = new_target(goal, new_field(memory[1], last_cell, first, cancel_flag))
     tree = new_tree(start, _bin_of(ground, car, start), Count(NO_MOTION))
     other = new_tree(goal, _bin_of(ground, car, goal), Count(NO_MOTION))
     heap, other_heap = [(0.0, 0)], [(0.0, 0)]

@@ -17,7 +17,9 @@ from mbf_costmap_nav.kernels.car.motion_primitives import (
 )
 from mbf_costmap_nav.kernels.car.state_tree import StateTree, best_state
 from mbf_costmap_nav.kernels.compiled import Count, kernel
-from mbf_costmap_nav.kernels.search.lazy_field import LazyField, field_cost
+from mbf_costmap_nav.kernels.search.lazy_field import BUCKET, WAITING, LazyField, field_cost
+from mbf_costmap_nav.kernels.search.padded_grid import octile_distance
+from mbf_costmap_nav.kernels.search.search_cells import Records
 
 FloatArray = NDArray[np.float64]
 
@@ -37,10 +39,31 @@ MEETINGS_PER_TRY = 8
 
 
 class Target(NamedTuple):
-    """What a tree grows to: the other root's ``pose`` (3,), and the ``field`` of costs [cells] to it."""
+    """What a tree grows to.
+
+    Attributes
+    ----------
+    pose : (3,) float64
+        Of the other root.
+    records, progress, stride, toward : arrays and numbers
+        Those of the field of costs [cells] to it.
+    fields : list of one LazyField
+        The field itself; a list, as a dozen arrays would be handed on with each call.
+    """
 
     pose: FloatArray
-    field: LazyField
+    records: Records
+    progress: NDArray[np.int64]
+    stride: int
+    toward: tuple[int, int]
+    fields: list[LazyField]
+
+
+@kernel
+def new_target(pose: FloatArray, field: LazyField) -> Target:
+    """Target at a pose, with the field of costs from there."""
+    toward = field.toward % field.stride, field.toward // field.stride
+    return Target(pose, field.records, field.progress, field.stride, toward, [field])
 
 
 class Joint(NamedTuple):
@@ -56,7 +79,13 @@ def heuristic(ground: Ground, car: Car, side: float, pose: FloatArray, target: T
     """Larger of the field [m] at the pose's cell and the length of the free curve."""
     geometry = ground.geometry
     ix, iy = int((pose[0] - geometry[1]) / geometry[0]), int((pose[1] - geometry[2]) / geometry[0])
-    around = float(field_cost(target.field, (iy + 1) * target.field.stride + ix + 1) * geometry[0])
+    x, y = ix + 1, iy + 1
+    cell = y * target.stride + x
+    cost, lower = target.records[cell].g, target.progress[BUCKET]  # a bucket is at least 1 wide
+    rest = octile_distance(abs(x - target.toward[0]), abs(y - target.toward[1]))
+    if target.progress[WAITING] > 0 and np.float32(lower) < cost + rest:
+        cost = field_cost(target.fields[0], cell)
+    around = float(cost * geometry[0])
     if around > CURVE_RANGE * car.radius:
         return around
     ends = (pose, target.pose) if side == FORWARD_SIDE else (target.pose, pose)
