@@ -136,6 +136,8 @@ class HeadingSearch:
             limits.chassis,
             limits.scratch,
             looks,
+            np.empty(len(distances), dtype=np.uint64),
+            np.full(len(distances), -1, dtype=np.int32),
             query.cancel_flag,
         )
         return best, cost, distances, predecessors

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from mbf_mesh_nav.arrays import FlagArray
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import plain_kernel
 
 
-@kernel
+@plain_kernel
 def lzf_decompress(block: FlagArray, content: FlagArray) -> int:
     """Decompress ``block`` (n,) uint8 into ``content`` (m,) uint8; return the bytes written, -1 for a damaged block.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, IntArray
-from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel, plain_kernel
 
 LEVELS = 16
 OCCUPIED, INNER = 2, 3
@@ -124,7 +124,7 @@ def cubes_of_all_nodes(children: IntArray, is_occupied: BoolArray, cubes: IntArr
     return read, found
 
 
-@kernel
+@plain_kernel
 def voxels_of_cubes(cubes: IntArray, voxels: IntArray) -> None:
     """Write the x, y and z of all voxels (n, 3) of the cubes (m, 4)."""
     count = 0

@@ -12,14 +12,14 @@ import math
 import numpy as np
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel, plain_kernel
 from mbf_mesh_nav.kernels.layers.chassis import Chassis, Scratch, gather_below, highest_below, wheel_plane
 from mbf_mesh_nav.kernels.layers.footprint_settling import LEAST_UPWARD, MAX_STEPS, face_below
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, row
 
 
-@kernel
+@plain_kernel
 def greatest_use(
     surface: Surface,
     chassis: Chassis,

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel, plain_kernel
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.search.near_far import after
 
@@ -24,7 +24,7 @@ _WAITING: Any = np.uint8(1)
 _TOUCHED: Any = np.uint8(2)
 
 
-@kernel
+@plain_kernel
 def front_arrival(d1: float, d2: float, bb: float, aa: float, dot: float) -> float:
     """Distance of corner v3 offered by its face whose corners v1, v2 are at ``d1``, ``d2``; inf if the front misses it.
 

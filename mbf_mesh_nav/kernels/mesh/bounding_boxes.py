@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel, plain_kernel
 from mbf_mesh_nav.kernels.mesh.vectors import difference, dot, triangle
 
 BRANCHES = 4
@@ -33,7 +33,7 @@ def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntA
     return boxes, levels
 
 
-@kernel
+@plain_kernel
 def _fill_boxes(vertices: FloatArray, faces: IntArray, margin: float, levels: IntArray, boxes: FloatArray) -> None:
     """Write the box of every ``BRANCHES`` faces, larger by ``margin`` [m] on all sides, then those around boxes."""
     for face in range(len(faces)):
@@ -63,7 +63,7 @@ def squared_distance_to_box(boxes: FloatArray, node: int, x: float, y: float, z:
     return squared
 
 
-@kernel
+@plain_kernel
 def closest_on_face(
     vertices: FloatArray, faces: IntArray, face: int, x: float, y: float, z: float
 ) -> tuple[float, float, float]:

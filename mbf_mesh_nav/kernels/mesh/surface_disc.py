@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_array_kernel, inner_kernel, kernel
 
 FIRST_BITS = 9
 """Binary logarithm of the places a table of vertices begins with; at most every second one is taken."""
@@ -69,7 +69,7 @@ def _search(
     return size, head
 
 
-@inner_kernel
+@inner_array_kernel
 def _table_of(members: IntArray, size: int, bits: int) -> IntArray:
     """The table of the first members."""
     table = np.empty(Count(1) << bits, dtype=np.int32)
@@ -90,7 +90,7 @@ def _place_of(table: IntArray, bits: int, vertex: int) -> int:
     return place
 
 
-@inner_kernel
+@inner_array_kernel
 def _first(members: IntArray, size: int, room: int) -> IntArray:
     """A copy of the first members in an array with ``room``."""
     copy = np.empty(room, dtype=np.int32)

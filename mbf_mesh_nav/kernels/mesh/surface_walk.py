@@ -11,13 +11,13 @@ import math
 import numpy as np
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Count, kernel
+from mbf_mesh_nav.kernels.compiled import Count, plain_kernel
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, cross, difference, dot, row
 
 _MAX_CROSSINGS = 200
 
 
-@kernel
+@plain_kernel
 def tangent(direction: Vector, normal: Vector) -> Vector:
     """Project a direction onto a face's plane and make it a unit vector; any tangent if it is along the normal."""
     along = dot(direction, normal)
@@ -29,7 +29,7 @@ def tangent(direction: Vector, normal: Vector) -> Vector:
     return x / length, y / length, z / length
 
 
-@kernel
+@plain_kernel
 def turned(direction: Vector, normal: Vector, angle: float) -> Vector:
     """Turn a tangent direction left (counter-clockwise seen from above) by ``angle`` [rad]."""
     left = cross(normal, direction)
@@ -37,7 +37,7 @@ def turned(direction: Vector, normal: Vector, angle: float) -> Vector:
     return (c * direction[0] + s * left[0], c * direction[1] + s * left[1], c * direction[2] + s * left[2])
 
 
-@kernel
+@plain_kernel
 def walk(
     vertices: FloatArray,
     faces: IntArray,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_array_kernel, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 
 
@@ -58,7 +58,7 @@ def touching_discs(
     return touching
 
 
-@inner_kernel
+@inner_array_kernel
 def _any_blocked(
     vertices: FloatArray,
     offsets: IntArray,

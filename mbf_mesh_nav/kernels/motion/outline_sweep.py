@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import kernel, plain_kernel
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.mesh.surface_walk import turned, walk
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, difference, dot, row
@@ -18,7 +18,7 @@ ROUNDING = 1e-6
 """A walk over the surface that is shorter than asked for by more than this [m] was ended by a border."""
 
 
-@kernel
+@plain_kernel
 def touching(
     vertices: FloatArray,
     faces: IntArray,

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Count, Index, kernel
+from mbf_mesh_nav.kernels.compiled import Count, Index, plain_kernel
 from mbf_mesh_nav.kernels.mesh.vectors import between, cross, difference, dot, norm, row, triangle
 
 _LEAST_WEIGHT = 1e-9  # of the corners with a finite cost, lest a cost is divided by zero
 
 
-@kernel
+@plain_kernel
 def way_cost(
     vertices: FloatArray,
     faces: IntArray,

@@ -12,7 +12,7 @@ Used by every controller and recovery that looks ahead. Planners do not use it: 
 from __future__ import annotations
 
 from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Index, kernel
+from mbf_mesh_nav.kernels.compiled import Index, plain_kernel
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, difference, dot, triangle
 
 LETHAL_RANK = 4.0
@@ -20,7 +20,7 @@ LETHAL_RANK = 4.0
 _SLACK = 1e-3  # float32 costs along a ring of one cost differ by rounding
 
 
-@kernel
+@plain_kernel
 def may_enter(before: float, now: float) -> bool:
     """Whether a step may lead from ground of rank ``before`` to ``now``; 0 is free ground."""
     if now <= 0.0:
@@ -28,7 +28,7 @@ def may_enter(before: float, now: float) -> bool:
     return bool(before > 0.0 and now <= before + _SLACK and now < LETHAL_RANK - _SLACK)
 
 
-@kernel
+@plain_kernel
 def rank_at(vertices: FloatArray, faces: IntArray, ranks: Float32Array, face: int, point: Vector) -> float:
     """Rank of a point [m] in a face, between those (V,) of its corners; 0 where the nearest of them is free."""
     a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]

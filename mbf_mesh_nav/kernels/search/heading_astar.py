@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, plain_kernel
 from mbf_mesh_nav.kernels.layers.chassis import Chassis, Scratch
 from mbf_mesh_nav.kernels.layers.footprint_sweep import move_use
 from mbf_mesh_nav.kernels.mesh.surface import Surface
@@ -50,7 +50,7 @@ class Moves(NamedTuple):
     shares: FloatArray
 
 
-@kernel
+@plain_kernel
 def search_with_heading(
     surface: Surface,
     moves: Moves,
@@ -71,6 +71,8 @@ def search_with_heading(
     chassis: Chassis,
     scratch: Scratch,
     find_out: bool,
+    heap: NDArray[np.uint64],
+    positions: IntArray,
     cancel_flag: FlagArray,
 ) -> tuple[int, float]:
     """Relax ``distances`` and ``predecessors`` in place until the best target state is settled.
@@ -102,6 +104,8 @@ def search_with_heading(
         The robot and its limits, and memory, see ``footprint_sweep``.
     find_out : bool
         Whether an ``UNKNOWN`` move is looked at and the answer written to ``known``, or counts as drivable.
+    heap, positions : (16 V,) uint64, (16 V,) int32
+        Memory for states that wait, of any content; -1 everywhere.
     cancel_flag : (1,) uint8
 
     Returns
@@ -111,9 +115,6 @@ def search_with_heading(
     total : float
         Cost of the path there [m], the rest to the goal and the last turn included.
     """
-    state_count = len(distances)
-    heap = np.empty(state_count, dtype=np.uint64)
-    positions = np.full(state_count, -1, dtype=np.int32)
     size = Count(0)
     for seed in seeds:
         key = distances[seed] + bound_at(bound, Index(seed // HEADINGS))
@@ -156,7 +157,7 @@ def search_with_heading(
     return best_state, best_total
 
 
-@kernel
+@plain_kernel
 def find_out_along(
     surface: Surface, moves: Moves, chain: IntArray, known: NDArray[np.uint8], chassis: Chassis, scratch: Scratch
 ) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Index, plain_kernel
 from mbf_mesh_nav.kernels.wave.bucket_queue import entry_of, item_of, key_of
 
 HeapArray = NDArray[np.uint64]
@@ -27,7 +27,7 @@ _TWO: Any = Index(2)
 _THREE: Any = Index(3)
 
 
-@kernel
+@plain_kernel
 def push_or_decrease(heap: HeapArray, positions: IntArray, size: int, item: int, key: np.float32) -> int:
     """Queue ``item`` with ``key`` >= 0, or lower its key if it is queued already; return the new size."""
     entry = entry_of(np.float32(key), item)
@@ -49,19 +49,19 @@ def push_or_decrease(heap: HeapArray, positions: IntArray, size: int, item: int,
     return size
 
 
-@kernel
+@plain_kernel
 def top_item(heap: HeapArray) -> int:
     """Return the item with the lowest key."""
     return item_of(heap[0])
 
 
-@kernel
+@plain_kernel
 def top_key(heap: HeapArray) -> np.float32:
     """Return the lowest key."""
     return key_of(heap[0])
 
 
-@kernel
+@plain_kernel
 def remove_top(heap: HeapArray, positions: IntArray, size: int) -> int:
     """Take the item with the lowest key off the heap; return the new size."""
     positions[item_of(heap[0])] = -1

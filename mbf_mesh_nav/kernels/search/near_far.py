@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import Float32Array, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, plain_kernel
 
 UNQUEUED, IN_NEAR, IN_FAR = 0, 1, 2
 
 
-@kernel
+@plain_kernel
 def after(place: int, ring: IntArray) -> int:
     """Return the place that follows one in the ring buffer."""
     following = place + ONE

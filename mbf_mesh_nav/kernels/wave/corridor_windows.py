@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Count, inner_kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_array_kernel, inner_kernel
 from mbf_mesh_nav.kernels.mesh.corners import corner_of
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, difference, dot, norm, row, set_row
 from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, next_round
@@ -30,7 +30,7 @@ def path_length(points: FloatArray, first: int, last: int) -> float:
     return total
 
 
-@inner_kernel
+@inner_array_kernel
 def faces_round(mesh: FreeFaces, corridor: IntArray, vertex: int, first: int, last: int, side: int) -> IntArray:
     """The faces (n,) on the other side of a vertex between two faces of a corridor, without these."""
     count, face, end = Count(0), next_round(mesh, vertex, Count(corridor[first]), side), corridor[last]
@@ -44,13 +44,13 @@ def faces_round(mesh: FreeFaces, corridor: IntArray, vertex: int, first: int, la
     return fan
 
 
-@inner_kernel
+@inner_array_kernel
 def turned_corridor(corridor: IntArray, fan: IntArray, first: int, last: int) -> IntArray:
     """The corridor with other faces between two of its faces."""
     return _part_with_fan(corridor, fan, first, last, Count(0), Count(len(corridor)))
 
 
-@inner_kernel
+@inner_array_kernel
 def _part_with_fan(corridor: IntArray, fan: IntArray, first: int, last: int, begin: int, end: int) -> IntArray:
     """``turned_corridor`` from its face ``begin`` to before its face ``end``, as they are numbered before."""
     count = len(fan)
@@ -64,7 +64,7 @@ def _part_with_fan(corridor: IntArray, fan: IntArray, first: int, last: int, beg
     return turned
 
 
-@inner_kernel
+@inner_array_kernel
 def pull_turned(
     mesh: FreeFaces, corridor: IntArray, points: FloatArray, marks: IntArray, fan: IntArray, first: int, last: int
 ) -> tuple[int, int, FloatArray, IntArray]:
@@ -176,7 +176,7 @@ def angle_at(at: Vector, first: Vector, second: Vector) -> float:
     return math.acos(min(max(dot(a, b) / max(norm(a) * norm(b), 1e-300), -1.0), 1.0))
 
 
-@inner_kernel
+@inner_array_kernel
 def spliced(
     points: FloatArray, marks: IntArray, pulled: FloatArray, pulled_marks: IntArray, low: int, high: int
 ) -> tuple[FloatArray, IntArray]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_array_kernel, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.corners import corner_of
 
 
@@ -68,7 +68,7 @@ def _end_piece(pieces: IntArray, index: int, first: int, last: int, begin: int, 
     pieces[index, 0], pieces[index, 1], pieces[index, 2], pieces[index, 3] = first, last, begin, end
 
 
-@inner_kernel
+@inner_array_kernel
 def _grown(corridor: IntArray) -> IntArray:
     longer = np.empty(2 * len(corridor), dtype=np.int32)
     for index in range(len(corridor)):
@@ -82,7 +82,7 @@ def _is_blocked(mesh: FreeFaces, face: int) -> bool:
     return bool(mesh.blocked[a] or mesh.blocked[b] or mesh.blocked[c])
 
 
-@inner_kernel
+@inner_array_kernel
 def _linked(mesh: FreeFaces, corridor: IntArray, begin: int, count: int, following: int) -> tuple[IntArray, int]:
     """Lead the corridor on to a face: at once, or by the shorter free fan round a common vertex; its length, or -1."""
     last = Count(corridor[count - 1])
@@ -108,7 +108,7 @@ def _linked(mesh: FreeFaces, corridor: IntArray, begin: int, count: int, followi
     return corridor, Count(-1)
 
 
-@inner_kernel
+@inner_array_kernel
 def _appended(corridor: IntArray, begin: int, count: int, face: int) -> tuple[IntArray, int]:
     """Append a face; into a face and straight back out of it is no step at all."""
     if count - begin > 1 and corridor[count - 2] == face:

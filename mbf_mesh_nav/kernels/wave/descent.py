@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_array_kernel, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, between, row, set_row
 from mbf_mesh_nav.kernels.wave.fronts import NO_BEND, SLACK
@@ -101,7 +101,7 @@ def trace_descent(
         count += 1
 
 
-@inner_kernel
+@inner_array_kernel
 def _grown(points: FloatArray, point_faces: IntArray, capacity: int) -> tuple[FloatArray, IntArray]:
     more_points, more_faces = np.empty((capacity, 3), dtype=np.float64), np.empty(capacity, dtype=np.int32)
     for i in range(len(points)):

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from mbf_mesh_nav.arrays import Float32Array, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, plain_kernel
 
 NO_BEND = -1
 """The path comes straight from the source."""
@@ -53,7 +53,7 @@ def _unfolded(u1: float, u2: float, c: float, b: float, a: float) -> tuple[float
     return source_x, source_depth, corner_x, corner_height
 
 
-@kernel
+@plain_kernel
 def unfolded_distance(u1: float, u2: float, c: float, b: float, a: float) -> tuple[float, int]:
     """Distance of corner 3 of an unfolded triangle from the distances ``u1``, ``u2`` of corners 1 and 2.
 

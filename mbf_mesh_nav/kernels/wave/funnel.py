@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel, plain_kernel
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, between, difference, dot, norm, row, set_row
 
 _AT_VERTEX = 1e-7  # m; a crossing this near to the end of a portal is that vertex
@@ -145,7 +145,7 @@ def _placed(
     return flat_a[0] + along * ux - side * height * uy, flat_a[1] + along * uy + side * height * ux
 
 
-@kernel
+@plain_kernel
 def _left(flat_portals: FloatArray, index: int) -> FlatPoint:
     return flat_portals[index, 0], flat_portals[index, 1]
 

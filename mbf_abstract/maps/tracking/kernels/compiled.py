@@ -6,10 +6,11 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 from mbf_abstract.compiling.kernel_cache import compile_lazily
+from mbf_abstract.compiling.passes import LoopCompiler
 
 KernelFunction = TypeVar("KernelFunction", bound=Callable[..., Any])
 
 
 def kernel(function: KernelFunction) -> KernelFunction:
     """Compile ``function`` with numba at its first call; divisions by zero give infinities, as in IEEE 754."""
-    return cast(KernelFunction, compile_lazily(function, error_model="numpy"))
+    return cast(KernelFunction, compile_lazily(function, error_model="numpy", pipeline_class=LoopCompiler))
