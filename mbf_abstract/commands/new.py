@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import keyword
 from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 from string import Template
 
@@ -59,7 +60,7 @@ def write_package(kind: str, name: str, map_name: str, out: Path) -> Path:
     Raises
     ------
     ValueError
-        No such kind or map, the kind does not go with the map, or the name is no lower-case module name.
+        No such kind or map, the kind does not go with the map, or the name is no lower-case module name, or taken.
     FileExistsError
         The folder is there already; nothing is overwritten.
     """
@@ -68,6 +69,8 @@ def write_package(kind: str, name: str, map_name: str, out: Path) -> Path:
         f"tests/test_{name}.py": _fill(*_place(f"test_{kind}.py.txt", map_name), name),
         "pyproject.toml": _project(kind, name, map_name),
     }
+    if taken := _taken(kind, name, map_name, out):
+        raise ValueError(f"the name {name!r} is taken by {taken}: choose another one")
     package = out / name
     package.mkdir(parents=True)
     (package / "tests").mkdir()
@@ -92,6 +95,19 @@ def plugin_source(kind: str, name: str, map_name: str = "") -> str:
     if map_name and on_any_map and not files(package).joinpath(path).is_file():
         package, path = _place(template, "")  # a recovery is the same on every map, its test is not
     return _fill(package, path, name)
+
+
+def _taken(kind: str, name: str, map_name: str, out: Path) -> str:
+    """What has a name already: a module, which the package would replace or be hidden by, or a type of plugins."""
+    found = find_spec(name)
+    origin = found.origin if found is not None else None
+    if origin is not None and not Path(origin).resolve().is_relative_to(out.resolve()):
+        return f"the module {origin}"
+    if kind == EXECUTIVE:
+        return ""
+    type_name = f"{map_name}.{name}" if map_name else name
+    points = installed_points(f"mbf.{GROUPS[kind].format(map=map_name)}")
+    return next((f"the plugin {point.value}" for point in points if point.name == type_name), "")
 
 
 def class_name(name: str) -> str:

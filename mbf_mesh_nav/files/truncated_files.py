@@ -17,7 +17,18 @@ from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 MAX_HEADER_LINES = 10_000
 LONGEST_LINE = 4096
+LONGEST_HEADER_LINE = 2**20  # a comment may be long
 STL_HEADER_BYTES, STL_FACE_BYTES = 84, 50
+PLY_FORMS = ("ascii", "binary_little_endian", "binary_big_endian")
+PLY_LINES = {
+    "format": f"'format FORM 1.0' with one of {', '.join(PLY_FORMS)}",
+    "element": "'element NAME COUNT' with a whole number",
+    "property": "a property",
+    "comment": "a comment",
+    "obj_info": "a comment",
+    "end_header": "'end_header'",
+}
+"""What the lines of a PLY header are, by their first words."""
 
 
 def refuse_cut_file(path: Path) -> None:
@@ -40,17 +51,35 @@ def refuse_cut_file(path: Path) -> None:
 def _check_ply(path: Path, file: BinaryIO) -> None:
     promised: dict[str, int] = {}
     is_text = False
-    for _ in range(MAX_HEADER_LINES):
-        words = file.readline().split()
-        if words[:1] == [b"format"]:
-            is_text = words[1:2] == [b"ascii"]
-        elif words[:1] == [b"element"]:
-            promised[words[1].decode()] = int(words[2])
-        elif words[:1] == [b"end_header"]:
-            break
+    for number in range(1, MAX_HEADER_LINES):
+        line = file.readline(LONGEST_HEADER_LINE)
+        match words := line.decode("latin-1").split():
+            case ["end_header"]:
+                break
+            case ["element", name, count] if count.isdecimal():
+                promised[name] = int(count)
+            case ["ply"] if number == 1:
+                pass
+            case ["format", form, "1.0"] if form in PLY_FORMS and number > 1:
+                is_text = form == "ascii"
+            case ["comment" | "obj_info" | "property", *_] if number > 1:
+                pass
+            case [] if line and number > 1:
+                pass
+            case _:
+                _refuse_ply_line(path, number, words)
     if is_text:
         faces_last = list(promised)[-1:] == ["face"]
         _compare(path, promised, _count_lines((line for line in file if line.strip()), faces_last))
+
+
+def _refuse_ply_line(path: Path, number: int, words: list[str]) -> None:
+    """Raise MeshError for a line of a header, or its end where another line is missing."""
+    expected = "'ply'" if number == 1 else "'end_header'"
+    if words and number > 1:
+        expected = PLY_LINES.get(words[0], f"a line that begins with one of {', '.join(PLY_LINES)}")
+    got = repr(" ".join(words)[:60]) if words else "nothing"
+    raise MeshError(str(path), [f"line {number}: expected {expected}, got {got}"])
 
 
 def _check_glb(path: Path, file: BinaryIO) -> None:

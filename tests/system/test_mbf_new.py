@@ -54,6 +54,22 @@ def test_the_tests_of_new_packages_pass(tmp_path):
         assert f"{name}/tests/" in result.stdout
 
 
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("planner", "numpy", "--map", "mesh"), "the name 'numpy' is taken by the module "),
+        (("executive", "json"), "the name 'json' is taken by the module "),
+        (("planner", "astar", "--map", "mesh"), "is taken by the plugin mbf_mesh_nav.planners.astar:AStarPlanner"),
+        (("layer", "voxel", "--map", "costmap"), "is taken by the plugin mbf_costmap_nav.layers.voxel:VoxelLayer"),
+        (("recovery", "back_up"), "is taken by the plugin mbf_abstract.maps.recoveries.back_up:BackUpRecovery"),
+    ],
+)
+def test_a_name_that_would_replace_or_clash_with_what_is_installed_is_refused(tmp_path, arguments, text):
+    refused = mbf("new", *arguments, "--out", tmp_path)
+    assert refused.exit_code == 2 and text in " ".join(refused.output.split()), refused.output
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.fixture
 def fresh_environment(tmp_path):
     """Run programs of a new virtual environment that has this package, installed from a wheel, and nothing else.

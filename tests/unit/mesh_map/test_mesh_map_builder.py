@@ -316,7 +316,11 @@ def test_parts_of_a_scene_are_found_by_name_and_moved_into_place(tmp_path):
     [
         ("none.ply", None, "no such file"),
         ("mesh.xyz", b"1 2 3", "unknown ending"),
-        ("empty.ply", b"", "cannot be read as ply"),
+        ("empty.ply", b"", "line 1: expected 'ply', got nothing"),
+        ("a.ply", b"ply\nnope\n", "line 2: expected a line that begins with one of format, .*, got 'nope'"),
+        ("a.ply", b"ply\nformat ascii 2.0\n", "line 2: expected 'format FORM 1.0' with .*, got 'format ascii 2.0'"),
+        ("a.ply", b"ply\nelement vertex -1\n", "line 2: expected 'element NAME COUNT' .*, got 'element vertex -1'"),
+        ("a.ply", b"ply\nformat ascii 1.0\n", "line 3: expected 'end_header', got nothing"),
         ("short.stl", b"solid nothing", "st|face"),
         ("text.h5", b"not hdf5", "HDF5"),
         (
