@@ -144,7 +144,8 @@ class _Run:
             return self._end(MoveBaseOutcome.SUCCESS, f"{len(self._results)} visit(s) made")
         first = self._results[failed[0]]
         text = f"{len(failed)} of {self._goal.visits} visit(s) failed, first visit {failed[0]}: {first.message}"
-        return self._end(first.outcome, text)
+        left_out = self._goal.visits - len(self._results)
+        return self._end(first.outcome, f"{text}; {left_out} visit(s) left out" if left_out else text)
 
     def _end(self, outcome: int, message: str) -> FollowWaypointsResult:
         return FollowWaypointsResult(int(outcome), message, results=self._results)

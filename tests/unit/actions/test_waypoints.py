@@ -44,6 +44,7 @@ def test_a_failed_waypoint_ends_the_waypoint_sequence_or_not(make_session, stop,
     assert sequence.failed == (1,)
     assert (sequence.success, sequence.outcome) == (False, GetPathOutcome.NO_PATH_FOUND)
     assert "1 of 3 visit(s) failed, first visit 1: walled in" in sequence.message
+    assert ("; 1 visit(s) left out" in sequence.message) == stop
 
 
 def test_a_waypoint_sequence_of_no_loops_is_refused_and_one_of_no_waypoints_is_over_at_once(make_session):
