@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -119,11 +120,17 @@ class RobotRun:
         timing = {"wall_time_s": round(wall_time, 3), "real_time_factor": round(factor, 2), **self._planning.to_json()}
         self.measured = {**metrics, **recording.verdict.to_json()}
         write_numbers(session.folder, self.measured, timing)
-        recording.save(session.folder / "recording.npz")
-        self._parts.remove()
-        for problem in options.write_views(session.folder, recording, {**self.measured, **timing}):
-            options.on_note(problem)
+        with ThreadPoolExecutor(1) as beside:  # most of it is compression, which leaves Python to the views
+            saving = beside.submit(self._save, recording)
+            for problem in options.write_views(session.folder, recording, {**self.measured, **timing}):
+                options.on_note(problem)
+            saving.result()
         return RunResult(recording.verdict, session.folder, {**self.measured, **timing}), recording
+
+    def _save(self, recording: Recording) -> None:
+        """Write the recording as a whole; its parts are not needed any more."""
+        recording.save(self._session.folder / "recording.npz")
+        self._parts.remove()
 
     def _report_progress(self, time: float, pose: Pose, velocity: Twist) -> None:
         """Report how far the running action is; an action that drives comes before one that only plans."""
