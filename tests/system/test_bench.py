@@ -3,12 +3,16 @@
 import json
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
+from mbf_abstract.config.findings import ConfigError
+from terrain.experiments.evaluation.all_sets import bench_all
+from terrain.experiments.evaluation.bench import Asked
 from terrain.experiments.evaluation.indoor import always
 from terrain.experiments.evaluation.protocol import Entry, Protocol, Trial
 from terrain.experiments.evaluation.trials import run_trials
@@ -67,15 +71,14 @@ def test_the_first_command_of_the_page_judges_its_planner_and_a_second_one_drive
     assert {"any_angle", "cvp"} < lines.keys(), "the shipped planners stand beside it"
 
 
-def test_planners_that_raise_crash_or_return_no_plan_have_their_reason_and_the_others_drive(tmp_path, monkeypatch):
-    (tmp_path / "bad_planners.py").write_text(BAD_PLANNERS)
-    (tmp_path / "nav.yaml").write_text(NAVIGATION)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    scenario = Scenario(
-        name="level 0",
+def short_drive(folder, name="level 0"):
+    """A drive of 2 m on a mesh, with its configuration in the folder."""
+    (folder / "nav.yaml").write_text(NAVIGATION)
+    return Scenario(
+        name=name,
         proves="A short drive.",
         backend="mesh",
-        navigation={"mesh": tmp_path / "nav.yaml"},
+        navigation={"mesh": folder / "nav.yaml"},
         world=GeneratedWorld(type="generated", size=(6.0, 5.0), spacing=0.5),
         robot="turtlebot",
         start=PlanarPose(x=2.0, y=2.5),
@@ -83,10 +86,58 @@ def test_planners_that_raise_crash_or_return_no_plan_have_their_reason_and_the_o
         physics="kinematic",
         time_limit=20.0,
     )
+
+
+def tiny(scenario, name="tiny", about="Tiny.", **more):
+    rules = {"success": "it arrived"}
+    return Protocol(name, "v1", about, "mesh", [Trial(scenario, 0)], rules, always, {}, **more)
+
+
+def test_all_sets_are_driven_by_one_command_and_stand_on_one_page(tmp_path, capsys):
+    sets = [tiny(short_drive(tmp_path)), tiny(short_drive(tmp_path, "level 1"), "people", part="blind")]
+    asked = Asked({"planner": "dijkstra"}, "mesh", "<mine>", (), 1, 600.0, True, tmp_path / "out", "mbf bench all")
+
+    bench_all(sets, asked)
+
+    answers = json.loads(capsys.readouterr().out)
+    assert [answer["protocol"]["name"] for answer in answers] == ["tiny", "people"]
+    assert all(answer["standings"][0]["arrived"] == 1 for answer in answers)
+    page = (tmp_path / "out" / "leaderboard.html").read_text()
+    links = re.findall(r'href="([^"]*leaderboard.html)"', page)
+    assert links == ["tiny_v1/leaderboard.html", "people_blind_v1/leaderboard.html"]
+    assert page.count("&lt;mine&gt;") == 2 and "1 of 1" in page
+    assert all(protocol.hash in page for protocol in sets)
+    assert all((tmp_path / "out" / link).is_file() for link in links)
+
+
+def test_nothing_is_driven_where_one_set_refuses_the_entry(tmp_path):
+    sets = [
+        tiny(short_drive(tmp_path)),
+        replace(tiny(short_drive(tmp_path)), entries={"mine": Entry("mine", "mesh", {})}),
+    ]
+    asked = Asked({"planner": "dijkstra"}, "mesh", "mine", (), 1, 600.0, False, tmp_path / "out", "mbf bench all")
+
+    with pytest.raises(ConfigError, match="a name of your own"):
+        bench_all(sets, asked)
+
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_entry_of_one_set_cannot_be_driven_beside_in_all(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(make_app(), ["bench", "all", "--planner", "dijkstra", "--beside", "any_angle"])
+    assert done.exit_code == 2
+    assert "expected all, as the sets have entries of their own, got 'any_angle'" in " ".join(done.output.split())
+    assert not list(tmp_path.iterdir())
+
+
+def test_planners_that_raise_crash_or_return_no_plan_have_their_reason_and_the_others_drive(tmp_path, monkeypatch):
+    (tmp_path / "bad_planners.py").write_text(BAD_PLANNERS)
+    monkeypatch.syspath_prepend(str(tmp_path))
     names = ["Raises", "Garbage", "Crashes"]
     entries = [Entry(name, "mesh", {"planner": f"bad_planners:{name}"}) for name in names]
     entries.append(Entry("good", "mesh", {"planner": "dijkstra"}))
-    protocol = Protocol("tiny", "v1", "", "mesh", [Trial(scenario, 0)], {"success": ""}, always, {})
+    protocol = tiny(short_drive(tmp_path))
 
     rows = {row["entry"]: row for row in run_trials(protocol, entries, tmp_path, workers=1, time_limit=600.0)}
 

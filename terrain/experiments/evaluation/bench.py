@@ -16,7 +16,7 @@ from mbf_abstract.whole_files import write_whole
 from terrain.commands.verdict_line import TERMINAL_COLOURS
 from terrain.experiments.evaluation.entrant import entrant
 from terrain.experiments.evaluation.joining import join
-from terrain.experiments.evaluation.leaderboard import page, settings_text, standings, terminal_table
+from terrain.experiments.evaluation.leaderboard import Standing, page, settings_text, standings, terminal_table
 from terrain.experiments.evaluation.levels import curves_of_levels
 from terrain.experiments.evaluation.protocol import Entry, Protocol
 from terrain.experiments.evaluation.results import described, read_results, results_of, shipped_results, write_results
@@ -43,10 +43,40 @@ class Asked:
     command: str
 
 
+@dataclass(frozen=True)
+class Judged:
+    """One protocol that has been driven: the head of its results, its lines, and whose they are."""
+
+    protocol: Protocol
+    head: dict[str, Any]
+    lines: Sequence[Standing]
+    own: set[str]
+    entries: dict[str, dict[str, Any]]
+    out: Path
+    files: Sequence[str]
+
+    @property
+    def title(self) -> str:
+        """What was driven, as a command."""
+        return f"mbf bench {self.protocol.title}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Head and standings, best first."""
+        return {**self.head, "standings": [vars(line) for line in self.lines]}
+
+
 def bench(protocol: Protocol, asked: Asked) -> None:
     """Drive everything, and write and print the results."""
     console = Console(stderr=asked.as_json)
-    entries = _entries(protocol, asked)
+    judged = drive(protocol, entries_of(protocol, asked), asked, console)
+    if asked.as_json:
+        typer.echo(json.dumps(judged.to_json()))
+    else:
+        show(judged, console)
+
+
+def drive(protocol: Protocol, entries: list[Entry], asked: Asked, console: Console) -> Judged:
+    """Drive the entries, and write results.json, leaderboard.html and the figures."""
     others = {name: read_results(Path(name)) for name in asked.beside if _is_file(name)}
     if (shipped := shipped_results(protocol)) is not None:
         others["the shipped results"] = shipped
@@ -56,30 +86,40 @@ def bench(protocol: Protocol, asked: Asked) -> None:
     write_results(results, asked.out / "results.json")
     table = join(results, others, protocol)
     lines = standings(table.rows, len(protocol.trials))
-    title = f"mbf bench {protocol.title}"
     own = {entry.name for entry in entries if entry.name not in protocol.entries}
-    about = [*_about(results.head), *table.origins]
     figures = write_difficulty(curves_of_levels(table.rows, [line.entry for line in lines]), asked.out)
+    names = ["results.json", "leaderboard.html", *(file.name for file in figures)]
+    judged = Judged(protocol, results.head, lines, own, table.entries, asked.out, names)
+    about = [*_about(results.head), *table.origins]
     curves = "".join(inline_svg(file) for file in figures if file.suffix == ".svg")
-    write_whole(asked.out / "leaderboard.html", page(title, about, table.rows, lines, own, table.entries, curves))
-    if asked.as_json:
-        typer.echo(json.dumps({**results.head, "standings": [vars(line) for line in lines]}))
-        return
-    console.print(terminal_table(lines, f"{title}, {len(protocol.trials)} worlds, protocol {protocol.hash}"))
+    write_whole(
+        asked.out / "leaderboard.html", page(judged.title, about, table.rows, lines, own, table.entries, curves)
+    )
+    return judged
+
+
+def show(judged: Judged, console: Console) -> None:
+    """Print the table, settings that are not the protocol's, why the user's entry fails, and where the files are."""
+    protocol, lines = judged.protocol, judged.lines
+    title = f"{judged.title}, {len(protocol.trials)} worlds, protocol {protocol.hash}"
+    console.print(terminal_table(lines, title))
     known = {name: described(entry) for name, entry in protocol.entries.items()}
-    for name, entry in table.entries.items():
-        if known.get(name) != entry:
-            text = f"{name}: {entry['backend']}, {settings_text(entry)}"
-            console.print(well_formed(text), markup=False, highlight=False, soft_wrap=True)
-    for line in lines:
-        if line.entry in own and line.reason:
-            text = f"{line.entry} fails most often with: {line.reason}"
-            console.print(well_formed(text), markup=False, highlight=False, soft_wrap=True)
-    names = ", ".join(["results.json", "leaderboard.html", *(file.name for file in figures)])
-    console.print(f"results in {asked.out}: {names}", markup=False, soft_wrap=True)
+    texts = [
+        f"{name}: {entry['backend']}, {settings_text(entry)}"
+        for name, entry in judged.entries.items()
+        if known.get(name) != entry
+    ]
+    texts += [
+        f"{line.entry} fails most often with: {line.reason}"
+        for line in lines
+        if line.entry in judged.own and line.reason
+    ]
+    texts.append(f"results in {judged.out}: {', '.join(judged.files)}")
+    for text in texts:
+        console.print(well_formed(text), markup=False, highlight=False, soft_wrap=True)
 
 
-def _entries(protocol: Protocol, asked: Asked) -> list[Entry]:
+def entries_of(protocol: Protocol, asked: Asked) -> list[Entry]:
     """The user's entry, and the shipped ones that are driven too, each once."""
     names = [name for name in asked.beside if not _is_file(name)]
     chosen = list(protocol.entries) if ALL_SHIPPED in names else list(dict.fromkeys(names))

@@ -1,4 +1,4 @@
-"""The commands ``mbf bench outdoor``, ``indoor`` and ``moving``."""
+"""The commands ``mbf bench outdoor``, ``indoor``, ``moving`` and ``all``."""
 
 from __future__ import annotations
 
@@ -29,6 +29,9 @@ BESIDE = typer.Option(
 SEEDS = typer.Option("0:2", "--seeds", help="First and one past the last seed of every level, 0:16, or a list, 1,5,9.")
 LEVELS = typer.Option("0:10", "--levels", help="Levels of difficulty, likewise; 0 is the easiest, 9 the hardest.")
 QUICK = typer.Option(False, "--quick", help=f"One world of every level: --seeds {QUICK_SEEDS}.")
+SURVEYS = typer.Option(
+    None, "--surveys", help="Folder with the four surveys, for 40 crops of real ground beside the generated worlds."
+)
 WORKERS = typer.Option(2, "--workers", min=1, help="Worker processes.")
 TIME_LIMIT = typer.Option(
     600.0, "--time-limit", min=1.0, help="Wall time in seconds after which a run counts as hung; compiling counts."
@@ -48,6 +51,7 @@ def register(bench: typer.Typer) -> None:
     bench.command("outdoor")(outdoor)
     bench.command("indoor")(indoor)
     bench.command("moving")(moving)
+    bench.command("all")(everything)
 
 
 def outdoor(
@@ -61,9 +65,7 @@ def outdoor(
     seeds: str = SEEDS,
     levels: str = LEVELS,
     quick: bool = QUICK,
-    surveys: Path | None = typer.Option(
-        None, "--surveys", help="Folder with the four surveys, for 40 crops of real ground beside the generated worlds."
-    ),
+    surveys: Path | None = SURVEYS,
     workers: int = WORKERS,
     time_limit: float = TIME_LIMIT,
     as_json: bool = AS_JSON,
@@ -135,6 +137,38 @@ def moving(
         from terrain.experiments.evaluation.moving import moving as protocol
 
         bench(protocol(_seeds(seeds, quick), _levels(levels), people.value), asked)
+
+
+def everything(
+    context: typer.Context,
+    planner: str = PLANNER,
+    controller: str = CONTROLLER,
+    backend: str = typer.Option("mesh", "--backend", help="Map of your entry in all sets: mesh or costmap."),
+    name: str = NAME,
+    settings: list[str] = SETTINGS,
+    beside: list[str] = typer.Option([], "--beside", help="all: drive the shipped entries of every set, too."),
+    seeds: str = SEEDS,
+    levels: str = LEVELS,
+    quick: bool = QUICK,
+    surveys: Path | None = SURVEYS,
+    workers: int = WORKERS,
+    time_limit: float = TIME_LIMIT,
+    as_json: bool = AS_JSON,
+    out: Path = typer.Option(Path("runs/bench_all"), "--out", help="Folder for results; runs that it holds are kept."),
+) -> None:
+    """Judge your planner or controller in all of them: on rough ground, among posts, among people of both kinds."""
+    if beside not in ([], ["all"]):
+        raise typer.BadParameter(f"expected all, as the sets have entries of their own, got {' '.join(beside)!r}")
+    asked = _asked(context)
+    with readable_errors():
+        from terrain.experiments.evaluation import indoor as posts
+        from terrain.experiments.evaluation import moving as people
+        from terrain.experiments.evaluation import outdoor as ground
+        from terrain.experiments.evaluation.all_sets import bench_all
+
+        worlds = _seeds(seeds, quick), _levels(levels)
+        walking = [people.moving(*worlds, kind.value) for kind in People]
+        bench_all([ground.outdoor(*worlds, surveys), posts.indoor(*worlds), *walking], asked)
 
 
 def _seeds(text: str, quick: bool) -> list[int]:
