@@ -40,7 +40,7 @@ def test_a_real_level_stands_in_the_world(shared_data: Path) -> None:
         ("a.obj", "v 0 0 0\nv 1 0 0\n", "no face"),
         ("a.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertex 0"),
         ("a.xyzw", "what", "unknown ending"),
-        ("a.ply", "ply\nwhat", "cannot be read"),
+        ("a.ply", "ply\nwhat", "line 2: expected a line that begins with"),
     ],
 )
 def test_a_bad_mesh_is_refused_with_its_name_and_reason(tmp_path: Path, name: str, content: str, reason: str) -> None:
