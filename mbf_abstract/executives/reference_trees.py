@@ -58,6 +58,8 @@ class TreeOptions:
         Every plan goes through it; empty = none.
     clear, out_of_collision, relax_planner, relax_controller, move_away : str
         Recovery behaviours by what they are for; empty = none.
+    escape : str
+        Leads a robot off ground that is closed to it, where no plan begins; empty = none.
     wait, give_way : str
         Where a tracked object blocks the path: ``wait`` for one that moves, and no second planner; around one that
         stands while this robot stands or creeps, as it may wait for this one, a plan, which is taken where it is no
@@ -94,6 +96,7 @@ class TreeOptions:
     relax_planner: str = ""
     relax_controller: str = ""
     move_away: str = ""
+    escape: str = ""
     wait: str = ""
     give_way: str = ""
     check_poses: bool = True
@@ -117,7 +120,7 @@ def navigation_tree(options: TreeOptions = TreeOptions()) -> Behaviour:
             MemRec(
                 "free the robot",
                 CheckPose("robot stands free?", at_robot=True),
-                _recoveries(options.clear, options.out_of_collision),
+                _recoveries(options.clear, options.out_of_collision, options.escape),
             ),
             MemRec("free the goal", CheckPose("goal is free?"), _recoveries(options.clear)),
             *steps,
@@ -127,7 +130,7 @@ def navigation_tree(options: TreeOptions = TreeOptions()) -> Behaviour:
 
 def planning_tree(options: TreeOptions = TreeOptions(), name: str = "planning") -> Behaviour:
     """Make the planning tree (Figure 6): plan, with a memory list of recoveries."""
-    recoveries = _recoveries(options.clear, options.relax_planner, options.move_away)
+    recoveries = _recoveries(options.clear, options.relax_planner, options.escape, options.move_away)
     return MemRec(
         name, GetPath(planner=options.planner, refiner=options.refiner), recoveries, give_up_on=BEYOND_RECOVERY
     )

@@ -4,11 +4,12 @@ When to use: the planner answers BLOCKED_START or a controller COLLISION because
 lethal or inscribed: something has come near, or it was pushed or started in a keep-out area. When not: the marks are
 ghosts; clear the costmap first. It stops (IMPASSABLE) where nothing leads out.
 
-First what stands there, on the map without drawn areas: among forward, back and both turns, each tried over
-``probe_distance``, the robot takes the one with the fewest cells under the footprint that are lethal or off the map,
-and then the lowest cost at the centre, until it touches nothing. Then what is only forbidden, on all maps of the
-server: it drives the shortest manoeuvre, at most ``max_distance`` long, that touches nothing more and ends where the
-outline is free and the centre below ``free_cost``. An unknown cell there counts as free; outside the map does not.
+First what stands there, on the map without drawn areas: among forward, back and both turns (the tightest curves of a
+robot with a turning circle), each tried over ``probe_distance``, the robot takes the one with the fewest cells under
+the footprint that are lethal or off the map, and then the lowest cost at the centre, until it touches nothing. Then
+what is only forbidden, on all maps of the server: it drives the shortest manoeuvre, at most ``max_distance`` long, that
+touches nothing more and ends where the outline is free and the centre below ``free_cost``. An unknown cell there counts
+as free; outside the map does not.
 """
 
 from __future__ import annotations
@@ -98,7 +99,10 @@ class EscapeRecovery(CostmapRecovery, ManoeuvreRecovery):
     def _motions(self) -> list[Twist]:
         p = self.parameters
         motions = [Twist.planar(vx=-p.speed), Twist.planar(vx=p.speed)]
-        if p.yaw_rate > 0.0:
+        if p.yaw_rate > 0.0 and self.min_turning_radius > 0.0:
+            wz = min(p.yaw_rate, p.speed / self.min_turning_radius)
+            motions += [Twist.planar(vx=motion.vx, wz=turn) for motion in motions for turn in (wz, -wz)]
+        elif p.yaw_rate > 0.0:
             motions += [Twist.planar(wz=p.yaw_rate), Twist.planar(wz=-p.yaw_rate)]
         return motions
 

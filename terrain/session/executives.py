@@ -160,6 +160,7 @@ class TreeDrive:
             out_of_collision=loaded("back_up"),
             relax_controller=loaded("relax"),
             move_away=loaded("move_away"),
+            escape=loaded("escape"),
             wait=loaded("wait"),
             give_way=loaded("give_way"),
         )

@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 import trimesh
+import yaml
 from PIL import Image
 
+from mbf_abstract.commands.starters import starters
+from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
+from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import RecoveryGoal
 from mbf_abstract.outcomes import GetPathOutcome, RecoveryOutcome
@@ -17,8 +21,8 @@ PLUGINS = """
 planner_patience: 1.0
 planners: [{name: planner, type: PLANNER}]
 controllers: [{name: controller, type: follow_path}]
-recovery_behaviors: [{name: escape, type: escape}]
 """
+ESCAPE = {"recovery_behaviors": [{"name": "escape", "type": "escape"}]}
 COSTMAP = """
 backend: costmap
 global_costmap:
@@ -72,12 +76,12 @@ def room(tmp_path):
     (tmp_path / "room.yaml").write_text("{image: room.png, resolution: 0.05, origin: [0, 0, 0], negate: 0}")
     sessions = []
 
-    def open_room(backend, pose, planner="dijkstra", walls=(), **robot):
+    def open_room(backend, pose, planner="dijkstra", walls=(), recoveries=ESCAPE, **robot):
         cells = np.full((120, 160), 254, dtype=np.uint8)
         for x0, y0, x1, y1 in walls:
             cells[120 - round(y1 / 0.05) : 120 - round(y0 / 0.05), round(x0 / 0.05) : round(x1 / 0.05)] = 0
         Image.fromarray(cells).save(tmp_path / "room.png")
-        text = CONFIGURATIONS[backend] + PLUGINS.replace("PLANNER", planner)
+        text = CONFIGURATIONS[backend] + PLUGINS.replace("PLANNER", planner) + yaml.safe_dump(recoveries)
         (tmp_path / "navigation.yaml").write_text(text + "".join(f"{key}: {value}\n" for key, value in robot.items()))
         session = LoopbackSession(Pose.planar(*pose))
         sessions.append(session)
@@ -88,6 +92,14 @@ def room(tmp_path):
     yield open_room
     for session in sessions:
         session.close()
+
+
+def of_starter(name):
+    """The recoveries of a starter with their parameters, as a configuration."""
+    whole = yaml.safe_load(starters()[name].replace("$map_file", "map"))
+    recoveries = whole["recovery_behaviors"]
+    blocks = {entry["name"]: whole[entry["name"]] for entry in recoveries if entry["name"] in whole}
+    return {"recovery_behaviors": recoveries, **blocks}
 
 
 def plan(session):
@@ -151,3 +163,33 @@ def test_a_car_leaves_an_area_in_curves_it_can_drive(room):
         command = session.robot.command
         assert abs(command.wz) * 0.6 <= abs(command.vx) + 1e-6
     assert handle.wait().success and plan(session).success, handle.wait().message
+
+
+STARTERS = {
+    "costmap, one map": "costmap_differential",
+    "costmap, both maps": "costmap_mapless",
+    "mesh": "mesh_skid_steered",
+}
+
+
+@pytest.mark.parametrize("pose", [(4.0, 3.0, 0.0), (3.1, 2.1, 0.7)])
+@pytest.mark.parametrize(("backend", "starter"), STARTERS.items())
+def test_a_goal_is_reached_from_within_an_area_with_the_recoveries_of_a_starter(room, backend, starter, pose):
+    session = room(backend, pose, recoveries=of_starter(starter))
+    result = session.navigator.go_to(session.navigator.ground_pose(1.0, 1.0))
+    assert result.success, result.message
+
+
+@pytest.mark.parametrize("check_poses", [True, False])
+@pytest.mark.parametrize(("backend", "starter"), STARTERS.items())
+def test_a_tree_leaves_an_area_by_its_escape(room, backend, starter, check_poses):
+    session = room(backend, (4.0, 3.0, 0.0), recoveries=of_starter(starter))
+    options = TreeOptions(escape="escape", check_poses=check_poses, second_planner_pause=0.0)
+    executive = TreeExecutive(navigation_tree(options), session.navigator)
+    result = executive.run(session.navigator.ground_pose(1.0, 1.0))
+    assert result.success, result.message
+
+
+@pytest.mark.parametrize("starter", starters())
+def test_every_starter_has_an_escape(starter):
+    assert {"name": "escape", "type": "escape"} in of_starter(starter)["recovery_behaviors"]

@@ -170,6 +170,14 @@ def test_escape_backs_out_of_an_obstacle_in_front(run):
     assert result.success and robot.state[0] + 0.2 < 0.15
 
 
+@pytest.mark.parametrize("start", [(0.0, 0.0, 0.0), (0.0, 0.0, 0.4), (0.0, 0.03, -0.7)])
+@pytest.mark.parametrize("behind", [[], [(-0.5, -1, -0.3, 1)], [(-0.5, -1, -0.22, 1)]])
+def test_escape_turns_no_car_on_the_spot(run, behind, start):
+    result, robot, _ = run(EscapeRecovery, around((0.1, 0.1, 0.3, 0.3), *behind), start=start, turning_radius=0.6)
+    assert result.success or (behind and result.outcome == RecoveryOutcome.IMPASSABLE), result.message
+    assert all(abs(command.wz) * 0.6 <= abs(command.vx) + 1e-9 for command in robot.commands)
+
+
 def test_escape_does_nothing_where_nothing_is_wrong(run):
     result, robot, _ = run(EscapeRecovery)
     assert result.success and robot.state.tolist() == [0.0, 0.0, 0.0]
