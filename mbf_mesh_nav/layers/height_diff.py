@@ -47,6 +47,11 @@ class HeightDiffLayer(MeshLayer):
     unit = "m"
     cacheable = True
 
+    @property
+    def lethal_for_good(self) -> LethalArray:
+        """Above ``threshold`` on the map as it is."""
+        return self.costs > self.parameters.threshold
+
     @classmethod
     def reach(cls, parameters: HeightDiffParameters) -> float:
         """From the vertex to the edge of the cylinder; unknown if that has no height."""

@@ -34,6 +34,11 @@ class SteepnessLayer(MeshLayer):
     parameters: SteepnessParameters
     unit = "rad"
 
+    @property
+    def lethal_for_good(self) -> LethalArray:
+        """Above ``threshold`` on the map as it is."""
+        return self.costs > self.parameters.threshold
+
     @classmethod
     def reach(cls, parameters: SteepnessParameters) -> float:
         """0: the faces around a vertex are all it looks at."""

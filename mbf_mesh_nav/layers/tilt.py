@@ -105,6 +105,12 @@ class TiltLayer(MeshLayer):
         self.roll: Float32Array = np.zeros(shape, dtype=np.float32)
         self.pitch: Float32Array = np.zeros(shape, dtype=np.float32)
         self.allowed: BoolArray = np.ones(shape, dtype=np.bool_)
+        self._too_few_as_measured: BoolArray = np.zeros(shape[0], dtype=np.bool_)
+
+    @property
+    def lethal_for_good(self) -> LethalArray:
+        """Where fewer headings than needed are allowed on the map as it is."""
+        return self._too_few_as_measured
 
     def lethal_reason(self, vertex: int) -> str:
         """How many headings are allowed and needed, and the error of the heights that the limits are narrowed by."""
@@ -139,6 +145,7 @@ class TiltLayer(MeshLayer):
         usage = self._usage(self.limits_as_measured())
         as_measured = (usage <= 1.0) & (bump < settings.ground_clearance)
         ranked = np.partition(np.where(as_measured, usage, np.inf), last, axis=1)[:, last]
+        self._too_few_as_measured = np.count_nonzero(as_measured, axis=1) < needed
         lethal = np.count_nonzero(self.allowed, axis=1) < needed
         return np.where(np.isinf(ranked), 1.0, ranked).astype(np.float32), lethal
 

@@ -16,6 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from mbf_abstract.geometry.arithmetic import arctan
+from mbf_abstract.maps.layers.error_margin import ErrorMargin
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.map.layer import LayerParameters, MeshLayer
@@ -25,7 +26,7 @@ Errors = float | FloatArray
 """One standard error [m] for all places, or one for each."""
 
 
-class HeightErrorParameters(LayerParameters):
+class HeightErrorParameters(LayerParameters, ErrorMargin):
     """Parameters of layers whose limits are narrower where heights are not exact."""
 
     height_error: float | None = parameter(
@@ -39,17 +40,25 @@ class HeightErrorParameters(LayerParameters):
 
 
 def errors_for(layer: MeshLayer) -> Errors:
-    """Standard error of the heights [m] that a layer counts with: what is configured, or what the map states (V,)."""
+    """Error of the heights [m] that a layer counts with: its margin times what is configured or the map states (V,)."""
     stated = layer.parameters.height_error if isinstance(layer.parameters, HeightErrorParameters) else None
     if stated is None and layer.height_errors is not None:
-        return layer.height_errors
-    return stated or 0.0
+        return _within_margin(layer, layer.height_errors)
+    return _within_margin(layer, stated or 0.0)
 
 
 def place_errors_for(layer: MeshLayer) -> Errors:
     """As ``errors_for``, of places on the faces around the vertices, where wheels stand."""
     errors = errors_for(layer)
-    return errors if isinstance(errors, float) or layer.place_errors is None else layer.place_errors
+    if isinstance(errors, float) or layer.place_errors is None:
+        return errors
+    return _within_margin(layer, layer.place_errors)
+
+
+def _within_margin(layer: MeshLayer, errors: Errors) -> Errors:
+    """Standard errors [m] times the margin of a layer."""
+    margin = layer.parameters.error_margin if isinstance(layer.parameters, HeightErrorParameters) else 1.0
+    return errors if margin == 1.0 else margin * errors
 
 
 def usual_error(errors: Errors) -> float:

@@ -113,6 +113,11 @@ class MeshLayer(map_layer.MapLayer):
         """Lethal mask (V,) bool in internal numbering, a read-only view."""
         return _read_only(self._lethal)
 
+    @property
+    def lethal_for_good(self) -> LethalArray:
+        """Read-only view of what is lethal however exact the map is: without what a margin for errors closes."""
+        return self.lethal
+
     @classmethod
     def reach(cls, parameters: Any) -> float:
         """How far [m] from a vertex lies whatever its values depend on, besides the faces around it; inf = unknown.

@@ -2,7 +2,7 @@
 
 On the map of the moment a wall and a movable box look the same. So the search is repeated with what is lethal in layers
 that depend on the mesh and their parameters alone: where even that leaves no way, waiting and trying again are useless.
-Inflated ground is left out, as ``relax`` makes it smaller.
+Inflated ground is left out, as is what a layer closes for errors of the map alone: ``relax`` makes both smaller.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_mesh_nav.arrays import BoolArray, IntArray
 from mbf_mesh_nav.layers.combinations.combination import CombinationLayer
 from mbf_mesh_nav.layers.inflation import InflationLayer
+from mbf_mesh_nav.map.height_error import HeightErrorParameters, errors_for
 from mbf_mesh_nav.map.layer import MeshLayer
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
@@ -45,7 +46,7 @@ def what_separates(mesh_map: MeshMap, start: Pose, goal: Pose, tolerance: float)
     walls = permanent_layers(mesh_map)
     closed = np.zeros(mesh_map.topology.vertex_count, dtype=np.bool_)
     for layer in walls:
-        closed |= layer.lethal
+        closed |= layer.lethal_for_good
     ends = mesh_map.locate([start.position, goal.position], np.inf).faces
     if (ends < 0).any() or not closed.any():
         return ()
@@ -81,10 +82,16 @@ def permanent_layers(mesh_map: MeshMap) -> list[MeshLayer]:
 
 
 def _is_fixed(layer: MeshLayer) -> bool:
-    """Whether neither a sensor nor time nor an inflated input changes a layer."""
+    """Whether neither a sensor nor time nor ``relax`` changes what is lethal for good in a layer."""
     kind = type(layer)
     changes = kind.insert_scan is not MeshLayer.insert_scan or kind.update is not MeshLayer.update
-    return not changes and not isinstance(layer, InflationLayer) and all(_is_fixed(read) for read in layer.inputs)
+    inputs = all(_is_fixed(read) and not _has_margin(read) for read in layer.inputs)
+    return inputs and not changes and not isinstance(layer, InflationLayer)
+
+
+def _has_margin(layer: MeshLayer) -> bool:
+    """Whether what a layer closes depends on errors of the map."""
+    return isinstance(layer.parameters, HeightErrorParameters) and bool(np.any(errors_for(layer)))
 
 
 def _pieces(edges: IntArray, closed: BoolArray) -> IntArray:

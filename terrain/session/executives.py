@@ -132,7 +132,10 @@ class MoveBaseDrive:
 
 
 class TreeDrive:
-    """A behaviour tree, with those of its recoveries that the server has loaded under the names of their types."""
+    """A behaviour tree, with those of its recoveries that the server has loaded.
+
+    They are known by the names of their types; ``relax_planner`` is a ``relax`` for plans.
+    """
 
     def __init__(self, navigator: Navigator, make_tree: TreeMaker, planner: str, controller: str) -> None:
         self._navigator = navigator
@@ -158,6 +161,7 @@ class TreeDrive:
             refiner=self._navigator.server.runtime.parameters.plan_refiner,
             clear=loaded("clear"),
             out_of_collision=loaded("back_up"),
+            relax_planner=loaded("relax_planner"),
             relax_controller=loaded("relax"),
             move_away=loaded("move_away"),
             escape=loaded("escape"),

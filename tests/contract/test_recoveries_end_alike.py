@@ -321,7 +321,10 @@ def test_only_clearing_around_a_lost_robot_is_a_tf_error(world, run, options, ou
 
 def test_relaxing_a_layer_without_inflation_is_a_failure(world, run):
     result, _ = run("relax", world.sensing(), layers=("obstacle",))
-    assert result.outcome == RecoveryOutcome.FAILURE and "'obstacle' has no inflation radius" in result.message
+    assert (
+        result.outcome == RecoveryOutcome.FAILURE
+        and "'obstacle' has no inflation radius and no margin" in result.message
+    )
 
 
 def test_relaxed_inflation_and_slack_come_back_by_the_clock_and_again_means_longer(world, run):
@@ -348,7 +351,7 @@ def test_relaxing_may_leave_the_inflation_as_it_is(world, run):
     navigation_map = world.sensing()
     before = navigation_map.snapshot()
     result, _ = run("relax", navigation_map, inflation_factor=1.0)
-    assert result.outcome == RecoveryOutcome.SUCCESS and "inflation as usual" in result.message
+    assert result.outcome == RecoveryOutcome.SUCCESS and "inflation and margins as usual" in result.message
     assert navigation_map.snapshot() is before
 
 

@@ -101,6 +101,22 @@ def test_a_greater_error_closes_more_ground_and_opens_none(one, other):
             assert (low.allowed | ~high.allowed).all()
 
 
+@settings(deadline=None, max_examples=15)
+@given(st.floats(0.0, 0.05), st.sampled_from([0.0, 0.25, 0.5, 2.0]))
+def test_a_margin_of_some_errors_is_as_so_many_times_the_error(error, margin):
+    rng = np.random.default_rng(4)
+    mesh = MeshMap.from_heights(rng.normal(0.0, 0.08, (14, 14)), 0.2, 0.2)
+    stated = rng.uniform(0.0, error, 14 * 14)
+    for layer_class, chosen in ((SteepnessLayer, {}), (HeightDiffLayer, {}), (TiltLayer, {"rigid": True})):
+        one = computed(mesh, layer_class, stated, error_margin=margin, **chosen)
+        other = computed(mesh, layer_class, margin * stated, **chosen)
+        np.testing.assert_array_equal(one.lethal, other.lethal)
+        np.testing.assert_array_equal(one.lethal_for_good, computed(mesh, layer_class, **chosen).lethal)
+        one = computed(mesh, layer_class, height_error=error, error_margin=margin, **chosen)
+        other = computed(mesh, layer_class, height_error=margin * error, **chosen)
+        np.testing.assert_array_equal(one.lethal, other.lethal)
+
+
 def test_limits_and_clearance_of_the_footprint_are_lower_by_the_error():
     mesh = MeshMap.from_arrays(*ramp(0.3))
     exact, wrong = (computed(mesh, TiltLayer, height_error=error) for error in (None, ERROR))
