@@ -95,7 +95,7 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
             if missing := run.call_beside("the map's missing_floor()", self.runtime.map_hooks.missing_floor):
                 # permanent: no recovery brings a map
                 return GetPathResult(GetPathOutcome.MAP_ERROR, missing, planner=plugin.name, permanent=True)
-            execution = PlannerExecution(run, request, area, has_fallback)
+            execution = PlannerExecution(run, request, area, has_fallback, handle.goal.max_retries)
             state = execution.execute()
             if run.waited and not run.canceled:
                 return GetPathResult(GetPathOutcome.PAT_EXCEEDED, run.waited, planner=plugin.name)

@@ -57,8 +57,10 @@ class PlannerExecution:
         request: PlanRequest,
         area: GoalArea | None = None,
         has_fallback: bool = False,
+        max_retries: int | None = None,
     ) -> None:
         self._run = run
+        self._max_retries = max_retries
         self._has_fallback = has_fallback
         self._runtime = run.runtime
         self._request = request
@@ -92,7 +94,8 @@ class PlannerExecution:
     def _judge(self, result: PlanResult, calls: int) -> PlannerState | None:
         """Whether this result ends the execution, in upstream's order; None = call again."""
         falls_back = self._has_fallback and result.outcome in FALLBACK_OUTCOMES
-        max_retries = 0 if falls_back else self._runtime.parameters.planner_max_retries
+        usual = self._runtime.parameters.planner_max_retries
+        max_retries = 0 if falls_back else usual if self._max_retries is None else self._max_retries
         if self._run.canceled and not self._run.patience_exceeded:
             return PlannerState.CANCELED
         if result.success:

@@ -44,8 +44,8 @@ class MissionContext:
         Newest feedback of driving along ``path``.
     failure : ActionResult, optional
         The last failure of planning, driving, a check or a watchdog; recoveries are picked by its code.
-    detour_asked : tuple of Pose and float, optional
-        Where a detour was asked for last, and until when [s] it is not asked for again there.
+    detour_asked : tuple of Pose, float and bool, optional
+        Where and when [s] a detour was asked for last, and whether it was taken.
     stuck : StuckMonitor
         The trouble so far: whether the same failure comes again and again at one place.
     """
@@ -57,7 +57,7 @@ class MissionContext:
     drive: ExePathResult | None = None
     feedback: ExePathFeedback | None = None
     failure: ActionResult | None = None
-    detour_asked: tuple[Pose, float] | None = None
+    detour_asked: tuple[Pose, float, bool] | None = None
     stuck: StuckMonitor = field(init=False, repr=False)
     _handles: list[AnyGoalHandle] = field(default_factory=list, repr=False)
 

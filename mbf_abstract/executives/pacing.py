@@ -149,12 +149,19 @@ class TimeLimit(Timed):
 
 
 class InBackground(Decorator):
-    """RUNNING whatever the child does; for a second planner beside a driving robot. A child that ends starts again."""
+    """RUNNING whatever the child does; for a second planner beside a driving robot. A child that ends starts again.
+
+    Fails once there is a new failure of the mission: the child may have found that to drive on is of no use.
+    """
+
+    def initialise(self) -> None:
+        """Note the last failure."""
+        self._known = self.mission.failure
 
     def update(self) -> Status:
         """Go on."""
         self.feedback_message = self.decorated.feedback_message
-        return Status.RUNNING
+        return Status.RUNNING if self.mission.failure is self._known else Status.FAILURE
 
 
 class PipelineSequence(Composite):

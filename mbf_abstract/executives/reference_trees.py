@@ -13,20 +13,21 @@ Use them as they are, or as a pattern: a tree is an expression of nodes. They ne
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
-from py_trees.behaviours import Success
+from py_trees.behaviours import Failure, Success
 from py_trees.common import ParallelPolicy
-from py_trees.composites import Parallel, Sequence
+from py_trees.composites import Parallel, Selector, Sequence
 
 from mbf_abstract.executives.conditions import BEYOND_RECOVERY, Do, recovery_would_help
-from mbf_abstract.executives.detours import Detour, PickByMotion, UpdatePath
+from mbf_abstract.executives.detours import TAKEN_PAUSE, Detour, UpdatePath
 from mbf_abstract.executives.escalation import Escalation
 from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery
 from mbf_abstract.executives.map_leaves import CheckPose, PathBlocked
+from mbf_abstract.executives.meeting import EndDrive, PickByMotion
 from mbf_abstract.executives.pacing import Delay, InBackground
 from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
+from mbf_abstract.executives.tree_options import TreeOptions
 from mbf_abstract.executives.watchdogs import MotorWatchdog, OscillationWatchdog, ProgressWatchdog
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome
@@ -35,81 +36,16 @@ BLOCKED = (ExePathOutcome.BLOCKED_PATH, ExePathOutcome.BLOCKED_GOAL, ExePathOutc
 OFF_THE_PATH = (ExePathOutcome.MISSED_PATH, ExePathOutcome.MISSED_GOAL)
 IN_CONTACT = (ExePathOutcome.COLLISION, ExePathOutcome.ROBOT_STUCK)
 SECOND_PLANNER_SLOT = 1
-LOOK_PERIOD = 1.0
+LOOK_PERIOD = 0.7
 """Time [s] between two looks at the path of a tree that asks who is on it."""
 STANDING = 1.5
 """Who has been seen to stand for less than this [s] may be about to move."""
+MEETING = 6.0
+"""Who came along the path and has stood for so long [s] before a robot that creeps does not go on before that one."""
+QUEUEING = 6
+"""So often the robot waits behind one that goes where it goes before it gives way."""
 CREEPING = 0.2
 """A robot slower than this [m/s] before somebody who stands is taken to be waited for."""
-
-
-@dataclass(frozen=True)
-class TreeOptions:
-    """Names of plugins and limits of the reference trees.
-
-    The defaults are those that the experiment of Table I measures (``mbf bench table1``), but for ``progress_timeout``,
-    which is off there.
-
-    Attributes
-    ----------
-    planner, second_planner, controller : str
-        Empty = the first one loaded.
-    refiner : str
-        Every plan goes through it; empty = none.
-    clear, out_of_collision, relax_planner, relax_controller, move_away : str
-        Recovery behaviours by what they are for; empty = none.
-    escape : str
-        Leads a robot off ground that is closed to it, where no plan begins; empty = none.
-    wait, give_way : str
-        Where a tracked object blocks the path: ``wait`` for one that moves, and no second planner; around one that
-        stands while this robot stands or creeps, as it may wait for this one, a plan, which is taken where it is no
-        more than ``longest_update`` or a few metres longer; then ``wait`` twice, then ``give_way``; one that is parked
-        is planned around at once. A path that is blocked by nobody has ``move_away`` as its last recovery, too.
-        Empty, the default: nobody asks.
-    check_poses : bool
-        Whether navigation first looks whether robot and goal stand free.
-    second_planner_pause : float
-        Pause of the second planner between two of its plans [s]; 0 = no second planner. With ``wait`` it looks at the
-        path every second, and the pause is that after a path around somebody that was too long to be taken.
-    second_planner_look_ahead : float
-        The second planner plans only where the path is blocked within this length [m] ahead; 0 = in any case.
-    longest_update : float
-        The second planner's path is taken up to this many times the length of what is left of the present one.
-    control_retries : int
-        Recoveries of driving before the tree falls back to planning.
-    replans : int
-        How often the tree falls back to planning before it gives up.
-    reuse_path : bool
-        Drive on along the same path after a recovery; otherwise plan anew after each failure of driving.
-    by_outcome : bool
-        Pick recoveries of driving by outcome code; otherwise take them in turn.
-    progress_timeout, oscillation_timeout, motor_timeout : float
-        Limits of the watchdogs [s]; 0 = off.
-    """
-
-    planner: str = ""
-    second_planner: str = ""
-    controller: str = ""
-    refiner: str = ""
-    clear: str = "clear"
-    out_of_collision: str = "back_up"
-    relax_planner: str = ""
-    relax_controller: str = ""
-    move_away: str = ""
-    escape: str = ""
-    wait: str = ""
-    give_way: str = ""
-    check_poses: bool = True
-    second_planner_pause: float = 8.0
-    second_planner_look_ahead: float = 3.0
-    longest_update: float = 1.5
-    control_retries: int = 8
-    replans: int = 3
-    reuse_path: bool = True
-    by_outcome: bool = True
-    progress_timeout: float = 20.0
-    oscillation_timeout: float = 0.0
-    motor_timeout: float = 0.0
 
 
 def navigation_tree(options: TreeOptions = TreeOptions()) -> Behaviour:
@@ -176,20 +112,41 @@ def _second_planner(options: TreeOptions) -> Behaviour:
     update = UpdatePath("update path", planner, SECOND_PLANNER_SLOT, options.longest_update, options.refiner)
     if options.second_planner_look_ahead <= 0.0:
         return update
-    if options.wait:  # what moves is waited for: a path around where it is now would lead through where it goes
-        around = _detour("update path", options, planner, SECOND_PLANNER_SLOT)
-        passing = _detour("pass it", options, planner, SECOND_PLANNER_SLOT)
-        creeps = Do("robot stands?", lambda mission: mission.robot_is_slower_than(CREEPING))
-        if_it_waits_for_us = Sequence("both stand", memory=True, children=[creeps, passing])
-        for_standing: dict[Motion, Behaviour] = {Motion.WAITING: if_it_waits_for_us, Motion.PARKED: around}
-        update = PickByMotion("who blocks it?", for_standing, nobody=around, standing=STANDING)
+    if not options.wait:
+        return _if_blocked(options, update)
+    # What moves is waited for: a path around where it is now would lead through where it goes.
+    around = _detour("update path", options, planner, SECOND_PLANNER_SLOT)
+    creeps = Do("robot stands?", lambda mission: mission.robot_is_slower_than(CREEPING))
+    passing = _detour("pass it", options, planner, SECOND_PLANNER_SLOT)
+    both_stand = Sequence("both stand", memory=True, children=[creeps, passing])
+    for_standing: dict[Motion, Behaviour] = {Motion.WAITING: both_stand, Motion.PARKED: around}
+    by_motion = PickByMotion("who blocks it?", for_standing, nobody=around, standing=STANDING)
+    return Selector("update", memory=True, children=[_if_blocked(options, by_motion), _beside(options, planner)])
+
+
+def _if_blocked(options: TreeOptions, update: Behaviour) -> Behaviour:
     blocked = PathBlocked("path blocked?", options.second_planner_look_ahead)
     return Sequence("update a blocked path", memory=True, children=[blocked, update])
 
 
-def _detour(name: str, options: TreeOptions, planner: str, slot: int = 0) -> Behaviour:
+def _beside(options: TreeOptions, planner: str) -> Behaviour:
+    """Where the robot creeps past somebody who stands: a path with more room, or the end of the drive."""
+    creeps = Do("robot creeps?", lambda mission: mission.robot_is_slower_than(CREEPING))
+    roomier = _detour("with more room", options, planner, SECOND_PLANNER_SLOT, once=True)
+    known: dict[Motion, Behaviour] = {Motion.WAITING: roomier, Motion.PARKED: roomier}
+    came: Behaviour | None = None
+    if options.give_way:
+        again = _detour("with more room for both", options, planner, SECOND_PLANNER_SLOT, once=True)
+        came = Selector("go around or give way", memory=True, children=[again, EndDrive("drive is over?", MEETING)])
+    beside = PickByMotion("who is beside it?", known, Failure("nobody"), came, standing=STANDING)
+    return Sequence("update a narrow path", memory=True, children=[creeps, beside])
+
+
+def _detour(name: str, options: TreeOptions, planner: str, slot: int = 0, once: bool = False) -> Behaviour:
+    """A detour; ``once``: a robot that creeps on one that was taken asks for no other one at this place."""
     pause = options.second_planner_pause or TreeOptions.second_planner_pause
-    return Detour(name, planner, slot, options.longest_update, options.refiner, pause)
+    taken_pause = pause if once else TAKEN_PAUSE
+    return Detour(name, planner, slot, options.longest_update, options.refiner, pause, taken_pause)
 
 
 def _recovery(options: TreeOptions) -> Behaviour:
@@ -213,16 +170,22 @@ def _unblock(options: TreeOptions) -> Behaviour:
     if not (o.wait and o.give_way):
         return usual
     usual = _in_turn("unblock", o.clear, o.relax_controller, o.out_of_collision, o.move_away)
-    patient: list[Behaviour] = [Recovery(o.wait, "wait"), Recovery(o.wait, "wait on"), Recovery(o.give_way)]
-    if o.reuse_path:
-        patient.insert(0, _detour("plan around it", o, o.planner))
     by_motion: dict[Motion, Behaviour] = {
         Motion.MOVING: Recovery(o.wait),
-        Motion.WAITING: RoundRobin("yield", patient),
+        Motion.WAITING: _patient("yield", o, 2),
     }
+    came, went = _patient("yield at once", o, 0), _patient("follow", o, QUEUEING)
     if not o.reuse_path:  # every recovery that succeeds is followed by a plan; otherwise one that fails is
         by_motion[Motion.PARKED] = Success("plan around it at once")
-    return PickByMotion("who is in the way?", by_motion, nobody=usual, standing=STANDING)
+    return PickByMotion("who is in the way?", by_motion, usual, came, went, standing=STANDING)
+
+
+def _patient(name: str, options: TreeOptions, waits: int) -> Behaviour:
+    """Around one that stands, else wait so often, then give way."""
+    o = options
+    nodes: list[Behaviour] = [Recovery(o.wait, f"wait {number + 1}") for number in range(waits)]
+    around = [_detour("plan around it", o, o.planner)] if o.reuse_path else []
+    return RoundRobin(name, [*around, *nodes, Recovery(o.give_way)])
 
 
 def _in_turn(name: str, *behaviors: str) -> RoundRobin:
@@ -232,6 +195,8 @@ def _in_turn(name: str, *behaviors: str) -> RoundRobin:
 def _recoveries(*behaviors: str) -> list[Behaviour]:
     return [Recovery(behavior) for behavior in behaviors if behavior]
 
+
+__all__ = ["REFERENCE_TREES", "TreeOptions", "control_tree", "navigation_tree", "planning_tree"]
 
 REFERENCE_TREES: dict[str, Callable[..., Behaviour]] = {
     "control": control_tree,

@@ -57,7 +57,7 @@ _pose = _expect(Pose, "a Pose, such as Pose.planar(x, y, yaw)")
 _name = _expect(str, "the name of a plugin")
 _number = _expect(numbers.Real, "a number")
 
-MAY_BE_NONE = {"start_pose", "dist_tolerance", "angle_tolerance", "goal_area", "recovery_behaviors"}
+MAY_BE_NONE = {"start_pose", "dist_tolerance", "angle_tolerance", "goal_area", "recovery_behaviors", "max_retries"}
 SEQUENCES = {
     "via": _sequence(_pose, "poses"),
     "waypoints": _sequence(_pose, "poses"),
@@ -76,5 +76,6 @@ VALUES = {
     "goal_area": _expect(GoalArea, "a GoalArea"),
     "concurrency_slot": _expect(numbers.Integral, "a whole number"),
     "parameters": _expect(Mapping, "a mapping of names to values"),
+    "max_retries": _expect(numbers.Integral, "a whole number"),
     "loops": _expect(numbers.Integral, "a whole number"),
 }

@@ -35,6 +35,9 @@ class GetPathGoal:
         Any place inside counts as reached; ``target_pose`` is then ignored.
     concurrency_slot : int
         0..255; goals in different slots run in parallel, a new goal in a used slot preempts.
+    max_retries : int, optional
+        How often a planner that fails is called again; None = the server's ``planner_max_retries``, below 0 = until its
+        patience is over.
     """
 
     target_pose: Pose
@@ -45,6 +48,7 @@ class GetPathGoal:
     via: tuple[Pose, ...] = ()
     goal_area: GoalArea | None = None
     concurrency_slot: int = 0
+    max_retries: int | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)

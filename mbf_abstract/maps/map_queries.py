@@ -103,26 +103,31 @@ class MapQueries:
         """
         return self._tracking()[1]
 
-    def what_blocks(self, path: Path, within_time: float = 2.0) -> tuple[Blockage, ...]:
+    def what_blocks(self, path: Path, within_time: float = 2.0, margin: float = 0.0) -> tuple[Blockage, ...]:
         """Tracked objects on a path, or on their way onto it, the first along the path first; empty if there is none.
 
         Parameters
         ----------
         within_time : float
             How far ahead [s] the places of moving objects count.
+        margin : float
+            Who is nearer than this [m] to the outline of the robot on the path blocks it, too.
 
         Raises
         ------
         ValueError
-            The time is negative or not finite.
+            The time or the margin is negative or not finite.
         """
-        if not 0.0 <= within_time < math.inf:
-            raise ValueError(f"within_time must be 0 s or more and finite, got {within_time}")
+        for name, value, unit in (("within_time", within_time, "s"), ("margin", margin, "m")):
+            if not 0.0 <= value < math.inf:
+                raise ValueError(f"{name} must be 0 {unit} or more and finite, got {value}")
         served, objects = self._tracking()
         if not objects or len(path) == 0:
             return ()
         there = self._transforms.transform_path(path, served.map.frame_id)
-        return blockages(served.map.robot_box, there, objects, within_time, served.map.same_storey)
+        box = served.map.robot_box
+        box = box._replace(radius=box.radius + margin)
+        return blockages(box, there, objects, within_time, served.map.same_storey)
 
     def _tracking(self) -> tuple[Served, tuple[TrackedObject, ...]]:
         """The first map that knows objects, the local one first, and they."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbf_abstract.geometry import Path
+from mbf_abstract.geometry import FloatArray, Path
 from mbf_abstract.maps.tracking.contact import SAME_STOREY, RobotBox
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 
@@ -28,11 +28,15 @@ class Blockage:
         Index of the first pose of the path at which the robot would touch it.
     distance : float
         Length [m] of the path up to there.
+    along : float
+        Cosine of the angle between the path there and the way the object was seen to come last: 1 = it goes where the
+        robot goes, -1 = it comes along the path; 0 also where it was never seen to move.
     """
 
     by: TrackedObject
     pose: int
     distance: float
+    along: float = 0.0
 
 
 def blockages(
@@ -61,5 +65,14 @@ def blockages(
         touches = (gaps < 0.0).any(axis=1) & (np.abs(heights - known.z) < same_storey)
         if touches.any():
             pose = int(np.argmax(touches))
-            found.append(Blockage(known, pose, path.length - float(path.remaining_lengths[pose])))
+            distance = path.length - float(path.remaining_lengths[pose])
+            found.append(Blockage(known, pose, distance, _along(known, poses, pose)))
     return tuple(sorted(found, key=lambda blockage: (blockage.pose, blockage.by.number)))
+
+
+def _along(known: TrackedObject, poses: FloatArray, pose: int) -> float:
+    """Cosine between the course of an object and the path at one of its ``poses`` (n, 3)."""
+    dx, dy = (poses[min(pose + 1, len(poses) - 1), :2] - poses[max(pose - 1, 0), :2]).tolist()
+    x, y = known.course
+    length = math.hypot(dx, dy) * math.hypot(x, y)
+    return (dx * x + dy * y) / length if length > 0.0 else 0.0

@@ -48,6 +48,9 @@ class TrackedObject:
     pace : float
         Greatest estimated speed of late [m/s]. Where an object turns round, the estimate of its velocity falls on its
         way to the other side, and its speed does not.
+    course : tuple of float
+        Which way it was seen to come last [m], along the axes of that frame, also while it stands; (0, 0) = it was
+        never seen to move.
     """
 
     number: int
@@ -64,6 +67,7 @@ class TrackedObject:
     stamp: float
     frame_id: str
     pace: float = 0.0
+    course: tuple[float, float] = (0.0, 0.0)
 
     @property
     def speed(self) -> float:
@@ -77,8 +81,11 @@ class TrackedObject:
     def seen_from(self, transform: Transform) -> TrackedObject:
         """Express it in the parent frame of a transform from its own one."""
         x, y, z = transform.apply(np.array([[self.x, self.y, self.z]]))[0].tolist()
-        there = transform.apply(np.array([[self.x + self.vx, self.y + self.vy, self.z]]))[0].tolist()
-        return replace(self, x=x, y=y, z=z, vx=there[0] - x, vy=there[1] - y, frame_id=transform.parent)
+        ahead = np.array([(self.vx, self.vy, 0.0), (*self.course, 0.0)])
+        ahead += (self.x, self.y, self.z)
+        (vx, vy), (course_x, course_y) = (transform.apply(ahead)[:, :2] - (x, y)).tolist()
+        frame, course = transform.parent, (course_x, course_y)
+        return replace(self, x=x, y=y, z=z, vx=vx, vy=vy, frame_id=frame, course=course)
 
     def to_data(self) -> dict[str, object]:
         """Plain JSON values, for events."""

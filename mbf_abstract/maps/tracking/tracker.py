@@ -224,6 +224,7 @@ class Tracker:
             vx=vx,
             vy=vy,
             pace=state[states_of.PACE] if moves else 0.0,
+            course=(state[states_of.COURSE_X], state[states_of.COURSE_Y]),
             radius=max(state[states_of.HALF_X], state[states_of.HALF_Y]),
             age=now - state[states_of.FIRST_SEEN],
             unseen=max(now - state[states_of.LAST_SEEN], 0.0),

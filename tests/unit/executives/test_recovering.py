@@ -7,7 +7,7 @@ from py_trees.common import Status
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.conditions import recovery_would_help
-from mbf_abstract.executives.detours import PickByMotion
+from mbf_abstract.executives.meeting import PickByMotion
 from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.maps.tracking.blocking import Blockage
@@ -224,7 +224,7 @@ AHEAD = Path.from_poses([Pose.planar(0.0, 0.0), Pose.planar(9.0, 0.0)])
 def among(tree, *blockages, path=AHEAD, lost=False):
     """Let the tree run in a mission whose map knows these objects on its path: (motion, metres ahead)."""
 
-    def what_blocks(of_path):
+    def what_blocks(of_path, margin):
         assert of_path is path
         if lost:
             raise RobotStateError("where am I?")
@@ -288,3 +288,16 @@ def test_one_node_may_stand_for_several_motions_and_for_nobody(scripted, tick):
         assert tick(among(tree, *blockages)) == "S"
     assert tick(among(tree, (Motion.MOVING, 1.0))) == "F"
     assert plan.ticks == 3
+
+
+@pytest.mark.parametrize(("along", "chosen"), [(-1.0, "came"), (-0.5, "other"), (0.0, "other"), (1.0, "went")])
+def test_who_waits_is_told_apart_by_whether_it_came_along_the_path_or_goes_where_the_robot_goes(
+    scripted, tick, along, chosen
+):
+    nodes = {name: scripted("S") for name in ("other", "came", "went")}
+    tree = PickByMotion("who?", {Motion.WAITING: nodes["other"]}, scripted("F"), nodes["came"], nodes["went"])
+    among(tree)
+    somebody = Blockage(SimpleNamespace(motion=Motion.WAITING, standing=1.5), 0, 1.0, along)
+    tree.mission.navigator.server.queries.what_blocks = lambda path, margin: (somebody,)
+    assert tick(tree) == "S"
+    assert [name for name, node in nodes.items() if node.ticks] == [chosen]

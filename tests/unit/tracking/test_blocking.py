@@ -43,6 +43,14 @@ def test_the_first_along_the_path_comes_first():
     assert [number for number, _ in found(known(1, x=6.0), known(2, x=2.0), known(3, x=4.0))] == [2, 3, 1]
 
 
+@pytest.mark.parametrize(
+    ("course", "along"), [((0.3, 0.0), 1.0), ((-0.3, 0.0), -1.0), ((0.0, 0.3), 0.0), ((0, 0), 0.0)]
+)
+def test_it_is_known_whether_who_stands_came_along_the_path(course, along):
+    stands = replace(known(motion=Motion.WAITING), course=course)
+    assert blockages(DISC, STRAIGHT, [stands], 2.0)[0].along == pytest.approx(along)
+
+
 def test_other_storeys_do_not_block():
     assert found(known(z=3.0)) == []
 

@@ -225,6 +225,7 @@ def test_a_person_who_stops_waits_and_is_parked_in_the_end():
     ]
     (person,) = tracker.objects((len(places) - 1) * PERIOD)
     assert (person.vx, person.vy) == (0.0, 0.0) and person.standing > 4.0
+    assert person.course[1] > 0.2 and abs(person.course[0]) < 0.1, "it is known which way the person came"
 
 
 def test_the_sensor_that_drives_past_a_box_sees_it_stand():
@@ -370,3 +371,4 @@ def test_an_object_is_expressed_in_another_frame():
     assert there.frame_id == "odom"
     assert (there.x, there.y) == pytest.approx((1.0 - person.y, person.x))
     assert (there.vx, there.vy) == pytest.approx((-person.vy, person.vx))
+    assert there.course == pytest.approx((-person.course[1], person.course[0])) and there.course[0] < -0.2

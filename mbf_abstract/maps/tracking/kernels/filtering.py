@@ -26,14 +26,13 @@ from mbf_abstract.maps.tracking.kernels.compiled import kernel
 FloatArray = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-STATE_COLUMNS = 21
+STATE_COLUMNS = 23
 X, Y, Z, VX, VY, VAR_POSITION, COVARIANCE, VAR_VELOCITY, HALF_X, HALF_Y = range(10)
-FIRST_SEEN, LAST_SEEN, SCANS, ANCHOR_X, ANCHOR_Y, ANCHOR_TIME, HAS_MOVED, CLEARED, OFF_X, OFF_Y, PACE = range(
-    10, STATE_COLUMNS
-)
-"""Columns of the state of an object. It stood at its anchor at ``ANCHOR_TIME`` [s]; ``HAS_MOVED`` is 0 or 1, and so is
-``CLEARED``: whether it was cleared and not seen since. In its last scan it was ``OFF`` [m] away from where it was
-expected. ``PACE`` [m/s] is its greatest speed of late."""
+FIRST_SEEN, LAST_SEEN, SCANS, ANCHOR_X, ANCHOR_Y, ANCHOR_TIME, HAS_MOVED, CLEARED, OFF_X, OFF_Y = range(10, 20)
+PACE, COURSE_X, COURSE_Y = range(20, STATE_COLUMNS)
+"""Columns of the state of an object. It stood at its anchor at ``ANCHOR_TIME`` [s], and came there by ``COURSE`` [m];
+``HAS_MOVED`` is 0 or 1, and so is ``CLEARED``: whether it was cleared and not seen since. In its last scan it was
+``OFF`` [m] away from where it was expected. ``PACE`` [m/s] is its greatest speed of late."""
 NOBODY = -1
 TURNED = 0.5
 """An object has turned if it is off to the same side in two scans, by this many standard deviations: the geometric mean
@@ -218,7 +217,7 @@ def note_motion(states: FloatArray, stamp: float, distance: float) -> None:
         dx, dy = state[X] - state[ANCHOR_X], state[Y] - state[ANCHOR_Y]
         if dx * dx + dy * dy > distance * distance:
             state[ANCHOR_X], state[ANCHOR_Y], state[ANCHOR_TIME] = state[X], state[Y], stamp
-            state[HAS_MOVED] = 1.0
+            state[COURSE_X], state[COURSE_Y], state[HAS_MOVED] = dx, dy, 1.0
 
 
 @kernel

@@ -1,0 +1,130 @@
+"""Who is in the way, and what is done about how that one moves: ``PickByMotion`` and ``EndDrive``."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping
+from contextlib import suppress
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.executives.mission import MissionContext
+from mbf_abstract.executives.nodes import Composite, Leaf
+from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.goals.result_types import ActionResult
+from mbf_abstract.maps.tracking.blocking import Blockage
+from mbf_abstract.maps.tracking.objects import Motion
+from mbf_abstract.outcomes import ExePathOutcome
+
+MARGIN = 0.2
+"""Who is this near [m] to the robot's outline on its path may keep its controller from following that."""
+LONGEST_PASSING = 3.0
+"""So far [m] from where a detour was taken the robot still passes who stands there."""
+ALONG = 0.7
+"""From this cosine on between the path and its way somebody goes along the path."""
+
+
+class PickByMotion(Composite):
+    """Run the child for how the first tracked object on the path ahead moves. What the others remember stays.
+
+    Parameters
+    ----------
+    by_motion : mapping of Motion to Behaviour
+        A motion that is missing makes the node fail. One node may stand for several motions, and for nobody.
+    nobody : Behaviour
+        Where no tracked object is in the way.
+    came, went : Behaviour, optional
+        For one that waits and was seen to come along the path, or to go where the robot goes, before it stood. None =
+        as ``by_motion`` has it.
+    length : float
+        How far ahead along the path [m] counts.
+    standing : float
+        What stands for less than this [s] counts as moving: it may have been seen for too short a time to know.
+    margin : float
+        Who is this near [m] to the robot's outline on the path is in the way: a controller cuts the path's corners.
+    """
+
+    children_remember = True
+
+    def __init__(
+        self,
+        name: str,
+        by_motion: Mapping[Motion, Behaviour],
+        nobody: Behaviour,
+        came: Behaviour | None = None,
+        went: Behaviour | None = None,
+        length: float = 3.0,
+        standing: float = 0.0,
+        margin: float = MARGIN,
+    ) -> None:
+        special = [node for node in (came, went) if node is not None]
+        super().__init__(name, list(dict.fromkeys([*by_motion.values(), *special, nobody])))
+        self.by_motion = dict(by_motion)
+        self.nobody, self.came, self.went = nobody, came, went
+        self.length = length
+        self.standing = standing
+        self.margin = margin
+        self._picked: Behaviour | None = None
+
+    def initialise(self) -> None:
+        """Ask the map when entered; where it cannot say, nobody is in the way."""
+        first = first_in_the_way(self.mission, self.length, self.margin)
+        if first is None:
+            self._picked, self.feedback_message = self.nobody, "nobody"
+            return
+        motion = first.by.motion if first.by.standing >= self.standing else Motion.MOVING
+        self._picked = self.by_motion.get(motion)
+        if motion is Motion.WAITING and abs(first.along) >= ALONG:
+            self._picked = (self.came if first.along < 0.0 else self.went) or self._picked
+        self.feedback_message = f"{motion.value}, {first.distance:.1f} m ahead"
+
+    def tick_children(self) -> Generator[Behaviour, None, Status]:
+        """Tick the picked child."""
+        if self._picked is None:
+            return Status.FAILURE
+        return (yield from self.tick_child(self._picked))
+
+
+def blockages_ahead(mission: MissionContext, margin: float) -> list[Blockage]:
+    """The tracked objects on the rest of the mission's path, the first one first; none where the map cannot say."""
+    if mission.path is not None:
+        with suppress(TransformError, RobotStateError):
+            return list(mission.navigator.server.queries.what_blocks(mission.path_to_follow(), margin=margin))
+    return []
+
+
+def first_in_the_way(mission: MissionContext, length: float, margin: float) -> Blockage | None:
+    """The first tracked object on the next ``length`` [m] of the mission's path."""
+    return next((found for found in blockages_ahead(mission, margin) if found.distance <= length), None)
+
+
+class EndDrive(Leaf):
+    """End the drive beside which it runs: who came along the path has stood in the way for ``patience`` [s].
+
+    Such a one waits for this robot, and neither gets on until one gives way. The mission's failure becomes
+    BLOCKED_PATH; where that one has stood for less, or a detour around it is driven, the node fails.
+    """
+
+    def __init__(self, name: str, patience: float, length: float = 3.0) -> None:
+        super().__init__(name)
+        self.patience = patience
+        self.length = length
+
+    def update(self) -> Status:
+        """Ask who it is, and for how long it stands."""
+        first = first_in_the_way(self.mission, self.length, MARGIN)
+        if first is None or first.by.standing < self.patience or self._passes():
+            return Status.FAILURE
+        text = f"object {first.by.number} came along the path and has stood for {first.by.standing:.1f} s"
+        self.mission.fail(ActionResult(int(ExePathOutcome.BLOCKED_PATH), text))
+        return Status.SUCCESS
+
+    def _passes(self) -> bool:
+        """Whether the robot drives a detour that was taken near here."""
+        asked = self.mission.detour_asked
+        if asked is None or not asked[2]:
+            return False
+        with suppress(RobotStateError):
+            return asked[0].distance_to(self.mission.robot_pose()) <= LONGEST_PASSING
+        return True

@@ -1,0 +1,118 @@
+"""What a tree that asks who is in its way does while it drives, on a map that answers what the test says."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from mbf_abstract.executives.reference_trees import QUEUEING, TreeOptions, navigation_tree
+from mbf_abstract.executives.tree_executive import TreeExecutive
+from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.queries import CellState
+from mbf_abstract.maps.tracking.blocking import Blockage
+from mbf_abstract.maps.tracking.objects import Motion
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
+from mbf_abstract.plugins import ControlResult, PlanResult
+from mbf_abstract.testing.faulty import drive
+from mbf_abstract.testing.scripted import straight_plan
+
+OPTIONS = TreeOptions(check_poses=False, wait="relax", give_way="back_up")
+GOAL = Pose.planar(6.0, 0.0)
+NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")
+BLOCKED = ControlResult(ExePathOutcome.BLOCKED_PATH, "somebody")
+
+
+@pytest.fixture
+def on_the_path(monkeypatch):
+    """Let a session's map know these objects, and say how bad its path is."""
+
+    def know(session, *blockages, state=CellState.LETHAL):
+        answer = SimpleNamespace(state=state)
+        queries = SimpleNamespace(what_blocks=lambda path, margin: blockages, check_path=lambda *asked: answer)
+        monkeypatch.setattr(type(session.server), "queries", queries)
+
+    return know
+
+
+def somebody(motion=Motion.WAITING, standing=3.0, distance=1.0, along=0.0):
+    return Blockage(SimpleNamespace(motion=motion, standing=standing, number=7), 0, distance, along)
+
+
+def creep(session, cycles=80):
+    session.controller.play(*[drive(0.1)] * cycles, session.controller.follow)
+
+
+def run(session, options=OPTIONS):
+    return TreeExecutive(navigation_tree(options), session.navigator).run(GOAL)
+
+
+@pytest.mark.parametrize(("motion", "plans"), [(Motion.WAITING, 2), (Motion.PARKED, 2), (Motion.MOVING, 1)])
+def test_a_robot_that_creeps_past_somebody_who_stands_asks_for_more_room(make_session, on_the_path, motion, plans):
+    session = make_session()
+    on_the_path(session, somebody(motion), state=CellState.INSCRIBED)
+    creep(session, 30)
+    assert run(session).success
+    assert len([request for request in session.planner.requests if request.start.x < 1.0]) == plans
+
+
+def test_a_detour_that_fails_is_not_asked_for_until_the_patience_is_over(make_session, on_the_path):
+    session = make_session(planner_max_retries=-1, planner_patience=2.0)
+    on_the_path(session, somebody())
+    creep(session)
+    session.planner.play(straight_plan, NO_PATH)
+    assert run(session).success
+    assert len([request for request in session.planner.requests if request.start.x < 0.6]) == 2
+
+
+@pytest.mark.parametrize(("standing", "yields"), [(5.5, []), (6.5, ["back_up"])])
+def test_before_one_that_came_along_the_path_and_stands_the_drive_ends(
+    make_session, recoveries, on_the_path, standing, yields
+):
+    session = make_session()
+    on_the_path(session, somebody(standing=standing, along=-1.0))
+    creep(session, 40)
+    session.planner.play(straight_plan, NO_PATH)
+    assert run(session).success
+    assert recoveries(session)[:1] == yields
+
+
+@pytest.mark.parametrize(("along", "recovery"), [(-1.0, ["back_up"]), (1.0, ["relax"])], ids=["came", "goes"])
+def test_behind_one_that_goes_where_the_robot_goes_it_waits_before_one_that_came_it_gives_way(
+    make_session, recoveries, on_the_path, along, recovery
+):
+    session = make_session()
+    on_the_path(session, somebody(along=along))
+    session.controller.play(BLOCKED, session.controller.follow)
+    session.planner.play(straight_plan, NO_PATH)
+    assert run(session, replace(OPTIONS, second_planner_pause=0.0)).success
+    assert recoveries(session) == recovery
+
+
+def test_it_gives_way_to_one_that_goes_where_it_goes_after_several_waits(make_session, recoveries, on_the_path):
+    session = make_session()
+    on_the_path(session, somebody(along=1.0))
+    session.controller.play(*[BLOCKED] * (QUEUEING + 1), session.controller.follow)
+    session.planner.play(straight_plan, NO_PATH)
+    assert run(session, replace(OPTIONS, second_planner_pause=0.0)).success
+    assert recoveries(session) == ["relax"] * QUEUEING + ["back_up"]
+
+
+def test_around_one_that_stands_before_one_that_moves_a_detour_leads_back_to_the_path_between_both(
+    make_session, on_the_path
+):
+    session = make_session()
+    on_the_path(session, somebody(), somebody(Motion.MOVING, 0.0, 5.0))
+    creep(session)
+    assert run(session).success
+    _, around, *_ = session.planner.requests
+    assert around.goal.x == pytest.approx(around.start.x + 3.0, abs=0.6) and around.dist_tolerance == 0.0
+    assert session.robot.pose.distance_to(GOAL) < 0.15
+
+
+def test_without_a_way_between_both_it_is_planned_to_the_goal(make_session, on_the_path):
+    session = make_session()
+    on_the_path(session, somebody(), somebody(Motion.MOVING, 0.0, 5.0))
+    creep(session)
+    session.planner.play(straight_plan, NO_PATH, straight_plan)
+    assert run(session).success
+    assert [request.goal.x for request in session.planner.requests[:3]] == pytest.approx([6.0, 3.0, 6.0], abs=0.7)
