@@ -77,6 +77,14 @@ def test_f267_without_retries_one_failure_is_the_end(make_session, states, patie
     assert end_state(states, session) == "no_plan_found"
 
 
+@pytest.mark.parametrize(("usual", "of_goal", "calls"), [(-1, 0, 1), (0, 2, 3), (3, None, 4)])
+def test_a_goal_may_have_its_own_number_of_retries(make_session, usual, of_goal, calls):
+    session = make_session(planner_max_retries=usual, planner_patience=5.0)
+    session.planner.play(NO_PATH)
+    assert session.navigator.get_path(TARGET, max_retries=of_goal).outcome == Outcome.NO_PATH_FOUND
+    assert len(session.planner.requests) == calls
+
+
 @pytest.mark.parametrize(("said", "reported"), [(0.0, 3.0), (7.5, 7.5)])
 def test_f268_a_cost_of_zero_becomes_the_paths_length(make_session, said, reported):
     session = make_session()

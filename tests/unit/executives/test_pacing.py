@@ -18,6 +18,8 @@ from mbf_abstract.executives.pacing import (
     TimeLimit,
 )
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goals.result_types import ActionResult
+from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.testing.faulty import drive
 
 
@@ -173,6 +175,13 @@ def test_what_runs_in_the_background_never_ends(bind, scripted, tick):
     child = scripted("SFRS")
     assert tick(bind(InBackground("beside", child)), 4) == "RRRR"
     assert child.ticks == 4
+
+
+def test_what_runs_in_the_background_ends_once_it_has_found_a_failure_of_the_mission(bind, scripted, tick):
+    tree = bind(InBackground("beside", scripted("S")))
+    assert tick(tree, 2) == "RR"
+    tree.mission.failure = ActionResult(int(ExePathOutcome.BLOCKED_PATH), "it is of no use")
+    assert tick(tree, 2) == "FR"
 
 
 def test_py_trees_own_nodes_go_into_our_trees(bind, tick):
