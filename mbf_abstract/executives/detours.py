@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.leaves import GetPath
-from mbf_abstract.executives.meeting import MARGIN, blockages_ahead
+from mbf_abstract.executives.trees.by_motion import MARGIN, blockages_ahead
 from mbf_abstract.geometry import Path
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.goals.result_types import ActionResult, GetPathResult

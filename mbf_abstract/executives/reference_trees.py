@@ -24,10 +24,10 @@ from mbf_abstract.executives.detours import TAKEN_PAUSE, Detour, UpdatePath
 from mbf_abstract.executives.escalation import Escalation
 from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery
 from mbf_abstract.executives.map_leaves import CheckPose, PathBlocked
-from mbf_abstract.executives.meeting import EndDrive, PickByMotion
 from mbf_abstract.executives.pacing import Delay, InBackground
 from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
-from mbf_abstract.executives.tree_options import TreeOptions
+from mbf_abstract.executives.trees.by_motion import EndDrive, PickByMotion
+from mbf_abstract.executives.trees.options import TreeOptions
 from mbf_abstract.executives.watchdogs import MotorWatchdog, OscillationWatchdog, ProgressWatchdog
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome

@@ -7,8 +7,8 @@ from py_trees.common import Status
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.conditions import recovery_would_help
-from mbf_abstract.executives.meeting import PickByMotion
 from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
+from mbf_abstract.executives.trees.by_motion import PickByMotion
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.maps.tracking.blocking import Blockage
 from mbf_abstract.maps.tracking.objects import Motion
