@@ -7,7 +7,9 @@ any more. Rooms of 6 m x 6 m with boxes and walls with gaps; on the costmap a ro
 of 0.25 m. With ``--open`` no walls stand around: the map ends in free ground; that of a mesh always does, on two sides.
 
     python benchmarks/agreement.py [--quick] [--json] [--seeds 0:40] [--map costmap] [--planners a,b] [--controllers c]
-                                   [--open] [--results FILE]
+                                   [--open] [--replan 2] [--results FILE]
+
+``--replan`` plans anew so many times a second while the robot drives, as ``move_base`` does with ``planner_frequency``.
 
 ``--results`` keeps every finished drive as a JSON line; a drive that is in the file is not repeated.
 """
@@ -29,7 +31,11 @@ from typing import Any
 
 from agreement_worlds import PERIOD, WORLDS, World
 
+from mbf_abstract.actions.manoeuvre_kept import goes_on, rest_of
+from mbf_abstract.actions.move_base_machine import NO_REPLAN_WITHIN
 from mbf_abstract.config.registry import PluginRegistry
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import Path as RobotPath
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
 from terrain.sweeps.log import SweepLog
@@ -59,26 +65,44 @@ class Verdict:
         return self.ending in ("arrived", "no path")
 
 
-def drive(world: World, planner: Any, controller: Any) -> Verdict:
-    """Plan and drive from the world's start to its goal; plan again once where the controller refuses."""
+def is_taken(world: World, followed: PathTracker | None, path: RobotPath) -> bool:
+    """Whether a new path is driven, as in ``move_base``, instead of the one that is followed."""
+    if followed is None:
+        return True
+    to_go = followed.deviation + followed.remaining
+    return not goes_on(followed.path, to_go, path) or not all(map(world.fits, rest_of(followed.path, to_go)))
+
+
+def drive(world: World, planner: Any, controller: Any, replan: float = 0.0) -> Verdict:
+    """Plan and drive from the world's start to its goal; plan again once where the controller refuses.
+
+    With ``replan`` it is planned anew so many times a second besides.
+    """
     pose, goal = world.ends
     path, velocity, refused_at, track, plan_ms = None, Twist(), None, [pose], math.nan
+    followed: PathTracker | None = None
 
     def ended(ending: str, message: str = "", at: Pose | None = None) -> Verdict:
         return Verdict(ending, message, at or pose, plan_ms)
 
-    for _ in range(round(LONGEST / PERIOD)):
-        if path is None:
+    for cycle in range(round(LONGEST / PERIOD)):
+        is_due = (
+            replan > 0.0 and cycle % round(1.0 / (replan * PERIOD)) == 0 and pose.distance_to(goal) > NO_REPLAN_WITHIN
+        )
+        if path is None or is_due:
             begin = time.process_time()
             plan = planner.make_plan(PlanRequest(pose, goal))
             plan_ms = 1e3 * (time.process_time() - begin) if math.isnan(plan_ms) else plan_ms
-            if not plan.success:
+            if not plan.success and path is None:
                 return ended("no path" if len(track) == 1 else "stranded", f"{int(plan.outcome)} {plan.message}")
-            path = plan.path
-            if (index := world.first_misfit(path)) >= 0:
-                return ended("misfit", f"pose {index} of {len(path)}", path[index])
-            if not controller.set_plan(path):
-                return ended("refused", "set_plan")
+            if plan.success and is_taken(world, followed if path is not None else None, plan.path):
+                path, followed = plan.path, PathTracker(plan.path)
+                if (index := world.first_misfit(path)) >= 0:
+                    return ended("misfit", f"pose {index} of {len(path)}", path[index])
+                if not controller.set_plan(path):
+                    return ended("refused", "set_plan")
+        assert followed is not None
+        followed.update(pose.position)
         if controller.is_goal_reached(pose, DIST_TOLERANCE, ANGLE_TOLERANCE):
             return ended("arrived")
         result = controller.compute_velocity_commands(ControlRequest(pose, velocity))
@@ -119,12 +143,13 @@ def run(backend: str, seeds: range, chosen: argparse.Namespace, log: SweepLog) -
         if planner not in (chosen.planners or [planner]) or controller not in (chosen.controllers or [controller]):
             continue
         key = "/".join((backend, planner, controller, str(seed), *["open"] * chosen.open))
+        key += f"/{chosen.replan:g}" if chosen.replan else ""
         if key not in log.rows:
             world = WORLDS[backend](seed, chosen.open)
             if world.ends is None:
                 continue
             made = world.plugin(PluginKind.PLANNER, planner), world.plugin(PluginKind.CONTROLLER, controller)
-            verdict = drive(world, *made)
+            verdict = drive(world, *made, chosen.replan)
             place = tuple(round(value, 2) for value in (verdict.pose.x, verdict.pose.y, verdict.pose.yaw))
             kept = {name: getattr(verdict, name) for name in ("ending", "message", "agrees", "plan_ms")}
             of = {"map": backend, "pair": f"{planner} + {controller}", "planner": planner, "seed": seed}
@@ -146,6 +171,7 @@ def main() -> None:
     parser.add_argument("--planners", type=names, default=[])
     parser.add_argument("--controllers", type=names, default=[])
     parser.add_argument("--open", action="store_true", help="no walls around")
+    parser.add_argument("--replan", type=float, default=0.0, help="plans a second while driving")
     parser.add_argument("--results", type=Path, default=None, help="file of finished drives")
     chosen = parser.parse_args()
     seeds = range(5) if chosen.quick else range(*map(int, chosen.seeds.split(":")))

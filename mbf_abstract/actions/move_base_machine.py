@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from mbf_abstract.actions.action import PREEMPTED
+from mbf_abstract.actions.manoeuvre_kept import goes_on, rest_of
 from mbf_abstract.actions.move_base_states import MoveBaseState, Trigger
 from mbf_abstract.actions.recovery_sequence import RecoverySequence
 from mbf_abstract.actions.sub_goals import Job, SubActions, SubGoals
 from mbf_abstract.actions.via_poses import ViaPoses
+from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.motion_watch import OscillationDetector
 from mbf_abstract.execution.plan_check import area_in_global_frame, in_global_frame
@@ -53,6 +55,7 @@ class MoveBaseMachine:
         self._target, self._via = target, via
         self._state = MoveBaseState.GET_PATH
         self._goals = SubGoals(sub_actions, job, area)
+        self._followed: Path | None = None
         self._failure: tuple[Trigger, End] | None = None
         self._ending: End | None = None
         self._recoveries = RecoverySequence(self._runtime, plugins)
@@ -172,13 +175,33 @@ class MoveBaseMachine:
 
     # ------------------------------------------------------------------------------------- following
     def _follow_path(self, path: Path) -> None:
+        if self._keeps_manoeuvre(path):
+            return
         if self._goals.follow is None:
             self._oscillation.reset()
             self._replan_watch.restart()
         self._via.follow(path)
-        self._followed_floor = self._planned_floor
+        self._followed, self._followed_floor = path, self._planned_floor
         self._enter(MoveBaseState.EXE_PATH)
         self._goals.send_path(path, self._arrival_tolerance(path))
+
+    def _keeps_manoeuvre(self, path: Path) -> bool:
+        """Whether the robot goes on with its manoeuvre instead of that of a newer plan for the same goal and floor."""
+        old, feedback = self._followed, self._goals.follow.feedback if self._goals.follow is not None else None
+        same = self._state is MoveBaseState.EXE_PATH and self._followed_floor == self._planned_floor
+        if old is None or feedback is None or not same:
+            return False
+        to_go = feedback.distance_along_path
+        if not goes_on(old, to_go, path) or self._obstacle_along(rest_of(old, to_go)):
+            return False
+        self._enter(self._state, kept=f"{to_go:.2f} m of a manoeuvre are left, the new plan has {path.length:.2f} m")
+        return True
+
+    def _obstacle_along(self, path: Path) -> str:
+        try:
+            return self._runtime.map_hooks.obstacle_along(path)
+        except Exception as error:  # a map that cannot say keeps no robot on its way
+            return error_text(error)
 
     def _planned_tolerance(self) -> float | None:
         """How far [m] from the target a plan may end; None = by the goal's area alone."""

@@ -43,6 +43,9 @@ class MapHooks(Protocol):
     def path_problem(self, path: Path) -> str:
         """Why the path of a planner, in the global frame, leads off the map; empty if it does not, or nobody knows."""
 
+    def obstacle_along(self, path: Path) -> str:
+        """Where the robot would touch something on a path in the global frame; empty if nowhere, or nobody knows."""
+
     def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
         """The answer of a controller with a command by which the robot touches nothing that moves."""
 

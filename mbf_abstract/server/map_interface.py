@@ -146,6 +146,10 @@ class MapInterface(PluginHost):
         """Why the path of a planner, in the global frame, leads off the map; empty if it does not, or nobody knows."""
         return ""
 
+    def obstacle_along(self, path: Path) -> str:
+        """Where the robot would touch something on a path in the global frame; empty if nowhere, or nobody knows."""
+        return ""
+
     def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
         """The answer of a controller with a command by which the robot touches nothing that moves; as it is here."""
         return answer

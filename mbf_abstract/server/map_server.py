@@ -28,7 +28,7 @@ from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult, PluginKind
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
-from mbf_abstract.server.path_on_map import path_problem
+from mbf_abstract.server.path_on_map import obstacle_along, path_problem
 from mbf_abstract.server.plugin_host import ServerError
 
 
@@ -106,13 +106,11 @@ class MapServer(AbstractNavigationServer):
         served = next(iter(self.served.values()))
         if served.map.missing_floor():
             served.update()
-        missing: str = served.map.missing_floor()
-        return missing
+        return str(served.map.missing_floor())
 
     def floors_taken(self) -> int:
         """Those of the map that plans are made on."""
-        count: int = next(iter(self.served.values())).map.floors_taken
-        return count
+        return int(next(iter(self.served.values())).map.floors_taken)
 
     def map_problem(self, name: str = "") -> str:
         """Why a map is stale, by default the one that the robot drives on; empty while it is fresh.
@@ -130,6 +128,10 @@ class MapServer(AbstractNavigationServer):
             there = self.runtime.transforms.transform_path(path, navigation_map.frame_id)
             return path_problem(navigation_map, path, there.positions)
         return ""
+
+    def obstacle_along(self, path: Path) -> str:
+        """Where the robot would touch something on a path, on any map; empty if nowhere."""
+        return obstacle_along([served.map for served in self.served.values()], self.runtime.transforms, path)
 
     @property
     def robot_radius(self) -> float:

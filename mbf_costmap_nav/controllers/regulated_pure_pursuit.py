@@ -17,6 +17,7 @@ import numpy as np
 from mbf_abstract.execution.path_tracker import CUSP_REACHED
 from mbf_abstract.geometry import Path, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.controllers.continued_path import carried_over
 from mbf_abstract.maps.controllers.end_of_path import at_exact_end, swept_poses, turn_left
 from mbf_abstract.maps.controllers.failures import blocked_path, obstacle_text
 from mbf_abstract.maps.controllers.room_to_turn import (
@@ -55,8 +56,9 @@ class RegulatedPurePursuitController(RegulatedFollower):
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path; that the robot stood at the end of the last one no longer counts."""
-        self._at_goal, self._room_to_turn, self._tight_places = False, RoomToTurn(), TightPlaces()
-        return super().set_plan(path)
+        old, self._at_goal, taken = self.tracker, False, super().set_plan(path)
+        self._room_to_turn, self._tight_places = carried_over(self._room_to_turn, self._tight_places, old, self.tracker)
+        return taken
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """Find the carrot, choose between turning and driving, regulate the speed, look ahead for collisions."""

@@ -69,7 +69,8 @@ class MeshMapParameters(OutlineParameters):
     edge_cost_factor: float = parameter(0.0, "How much a cost of 1 lengthens an edge, in lengths.", ge=0.0, le=100.0)
     inscribed_radius: float = parameter(
         0.0,
-        "Radius of the robot's inner circle; the mesh should be finer than half of it. 0 = unknown.",
+        "Radius of the robot's inner circle; the mesh should be finer than half of it. 0 = unknown; motions are looked "
+        "at with the largest one of the layers then.",
         unit="m",
         ge=0.0,
     )

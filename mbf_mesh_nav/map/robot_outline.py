@@ -95,5 +95,14 @@ class OutlinedMap(LayeredMap):
 
     @property
     def robot_reach(self) -> float:
-        """How far [m] the robot reaches from its origin: its outline, else its disc, else that of an unknown robot."""
-        return float(norm(self.footprint).max()) if self.footprint else self.inscribed_radius or UNKNOWN_RADIUS
+        """How far [m] the robot reaches from its origin: its outline, else its disc."""
+        return float(norm(self.footprint).max()) if self.footprint else self.disc_reach
+
+    @property
+    def disc_reach(self) -> float:
+        """Radius [m] of the robot's disc; where it is unknown, the largest one that layers have, else a guess.
+
+        So a robot may drive where its plans lead, whose costs are those of the layers.
+        """
+        inflated = (getattr(layer.parameters, "inscribed_radius", 0.0) for layer in self.layers.values())
+        return self.inscribed_radius or max(inflated, default=0.0) or UNKNOWN_RADIUS

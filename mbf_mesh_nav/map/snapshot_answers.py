@@ -22,7 +22,7 @@ from mbf_mesh_nav.map.robot_outline import OutlinedMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.borders import beyond_border
 from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
-from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE, UNKNOWN_RADIUS, forbidden_ahead, nearest_of
+from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE, forbidden_ahead, nearest_of
 from mbf_mesh_nav.mesh.topology import MeshTopology
 from mbf_mesh_nav.mesh.turning import pivots, slope_at, swept_obstacle
 
@@ -170,9 +170,8 @@ class SnapshotAnswers(OutlinedMap):
             motion = place, pose, command, duration, self.footprint
             if swept := swept_obstacle(self.topology, ranks, *motion, may_overhang=may_overhang):
                 return swept
-        radius = self.inscribed_radius or UNKNOWN_RADIUS
         locator = self.locator if may_overhang else None
-        return forbidden_ahead(self.topology, ranks, place, pose, command, duration, radius, locator)
+        return forbidden_ahead(self.topology, ranks, place, pose, command, duration, self.disc_reach, locator)
 
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
         """Offset [m] to the nearest lethal vertex of the robot's storey; None if none is ``within`` [m]."""

@@ -49,7 +49,7 @@ mesh_map:
 """,
 }
 MAPS = {"costmap": ("global_costmap", "local_costmap"), "mesh": ("mesh_map",)}
-CONTROLLER = {"costmap": "follow_path", "mesh": "path_follower"}
+CONTROLLERS = {"costmap": ("follow_path", "regulated_pure_pursuit"), "mesh": ("path_follower", "follow_path")}
 KEY = {"costmap": "zones", "mesh": "regions"}
 DOOR = {"name": "door", "polygon": [[2.8, 0.0], [3.2, 0.0], [3.2, 3.0], [2.8, 3.0]]}
 HALF = {"name": "half", "polygon": [[2.8, 0.0], [3.2, 0.0], [3.2, 2.0], [2.8, 2.0]]}
@@ -61,16 +61,19 @@ def backend(request):
     return request.param
 
 
+@pytest.fixture(params=[0])
+def controller(request, backend):
+    return CONTROLLERS[backend][request.param]
+
+
 @pytest.fixture
-def room(backend, tmp_path):
+def room(backend, controller, tmp_path):
     """A session in a room of 6 m x 3 m."""
     Image.fromarray(np.full((60, 120), 254, dtype=np.uint8)).save(tmp_path / "room.png")
     (tmp_path / "room.yaml").write_text("{image: room.png, resolution: 0.05, origin: [0, 0, 0], negate: 0}")
     vertices, faces = heightfield_mesh(np.zeros((31, 61)), 0.1, 0.1)[:2]
     trimesh.Trimesh(vertices, faces, process=False).export(tmp_path / "room.ply")
-    (tmp_path / "navigation.yaml").write_text(
-        CONFIGURATIONS[backend] + PLUGINS.replace("CONTROLLER", CONTROLLER[backend])
-    )
+    (tmp_path / "navigation.yaml").write_text(CONFIGURATIONS[backend] + PLUGINS.replace("CONTROLLER", controller))
     with LoopbackSession(Pose.planar(1.0, 1.5)) as session:
         session.serve(*read_config(tmp_path / "navigation.yaml"), session.robot, session.transforms)
         session.clock.sleep(1.0)
@@ -106,6 +109,7 @@ def test_a_closed_area_turns_plans_and_an_opened_one_lets_them_through(room, dra
     assert plan(room).path.length == pytest.approx(4.0, abs=0.1)
 
 
+@pytest.mark.parametrize("controller", [0, 1], indirect=True)
 def test_a_drive_goes_around_an_area_that_is_closed_while_it_runs(room, draw):
     handle = room.navigator.send(MoveBaseGoal(room.navigator.ground_pose(5.0, 1.5)))
     room.clock.sleep(1.0)

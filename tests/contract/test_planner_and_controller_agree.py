@@ -116,6 +116,17 @@ def test_sampled_motions_arrive_where_room_is_narrow_and_touch_nothing(backend, 
     assert verdict.ending == "arrived", verdict
 
 
+@pytest.mark.parametrize(
+    ("controller", "seed"),
+    [("regulated_pure_pursuit", seed) for seed in (23, 47, 57)] + [("follow_path", seed) for seed in (10, 18, 26)],
+)
+def test_a_robot_that_plans_anew_twice_a_second_arrives(controller, seed):
+    world = agreement.WORLDS["costmap"](seed)
+    made = world.plugin(PluginKind.PLANNER, "dijkstra"), world.plugin(PluginKind.CONTROLLER, controller)
+    verdict = agreement.drive(world, *made, replan=2.0)
+    assert verdict.ending == "arrived", verdict
+
+
 class OnePlan:
     """A planner that knows one path, and only once."""
 

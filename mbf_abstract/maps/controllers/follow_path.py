@@ -17,6 +17,7 @@ from mbf_abstract.execution.path_tracker import CUSP_REACHED, PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.maps.controllers.continued_path import carried_over
 from mbf_abstract.maps.controllers.end_of_path import at_exact_end, turn_left
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_path, no_path, outside_map, storeys_off
 from mbf_abstract.maps.controllers.follow_path_parameters import FollowPathParameters
@@ -77,10 +78,10 @@ class FollowPath(MapPlugin, AbstractController):
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path that has poses."""
-        self._tracker = PathTracker(path, dimensions=2) if len(path) else None
-        self._room_to_turn, self._tight_places, self._turn_at_goal = RoomToTurn(), TightPlaces(), TurnAtGoal(AT_END)
-        self.ended_early = False
-        return self._tracker is not None
+        new, kept = PathTracker(path, dimensions=2) if len(path) else None, (self._room_to_turn, self._tight_places)
+        self._room_to_turn, self._tight_places = carried_over(*kept, self._tracker, new)
+        self._tracker, self._turn_at_goal, self.ended_early = new, TurnAtGoal(AT_END), False
+        return new is not None
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """Find the point ahead, steer to it, and check the motion for obstacles."""

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 
@@ -53,6 +54,12 @@ class RoomToTurn:
         self._driven = 0.0
         self._furthest = -math.inf
         self._made_room_at: Pose | None = None
+
+    def shifted(self, shift: float) -> RoomToTurn:
+        """Return the same where lengths [m] along the path have grown by ``shift``."""
+        moved = copy(self)
+        moved._furthest += shift
+        return moved
 
     def choose(
         self,

@@ -51,6 +51,16 @@ class TightPlaces:
         self._next = math.inf
         self._close_until = -math.inf
 
+    def shifted(self, shift: float, tracker: PathTracker) -> TightPlaces:
+        """Return those of a path on which lengths [m] have grown by ``shift``; what lies ahead is looked at anew.
+
+        That the rest of the path is driven closely holds for a path that ends as near.
+        """
+        moved = TightPlaces()
+        if self._close_until < math.inf or _ends_near(tracker):
+            moved._close_until = self._close_until + shift
+        return moved
+
     def distance(self, tracker: PathTracker, reverses: bool, fits: Fits) -> float:
         """Length [m] along the path to the next tight place, whatever cusps lie between; inf = none within ``REACH``.
 
@@ -82,7 +92,7 @@ class TightPlaces:
         if command.vx == 0.0:
             self._close_until = max(self._close_until, tracker.progress + KEPT)
             return False
-        near_end = wanted.vx != 0.0 and tracker.on_last_section and tracker.remaining <= CLOSE_FROM
+        near_end = wanted.vx != 0.0 and _ends_near(tracker)
         is_new = near_end and self._close_until < math.inf
         self._close_until = math.inf if near_end else self._close_until
         return is_new
@@ -111,6 +121,11 @@ def _poses_at(tracker: PathTracker, lengths: FloatArray, reverses: bool) -> Floa
         segments = np.searchsorted(tracker.lengths, lengths, side="right") - 1
         yaws += np.where(tracker.reverse[np.minimum(segments, len(tracker.reverse) - 1)], math.pi, 0.0)
     return np.column_stack([tracker.points_at(lengths)[:, :2], yaws])
+
+
+def _ends_near(tracker: PathTracker) -> bool:
+    """Whether a path has no cusp any more, and ends so near that it may be driven closely to its end."""
+    return tracker.on_last_section and tracker.remaining <= CLOSE_FROM
 
 
 def _next_cusp(tracker: PathTracker, fits: Fits) -> float:

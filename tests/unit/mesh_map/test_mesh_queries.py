@@ -5,7 +5,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.queries import CellState, PlaceQuery
@@ -183,3 +183,18 @@ def test_between_vertices_where_the_robot_touches_nothing_it_touches_nothing():
     states = [check(Pose.planar(0.0, y)).state for y in (0.0, -0.02, 0.02)]
     assert states == [CellState.INSCRIBED, CellState.INSCRIBED, CellState.LETHAL]
     assert there.pose_check(PlaceQuery(safety_dist=0.01))(Pose.planar(0.0, 0.0)).state is CellState.LETHAL
+
+
+@pytest.mark.parametrize(("own", "layers", "free_to"), [(0.0, 0.1, 1.8), (0.0, 0.25, 1.6), (0.25, 0.1, 1.6)])
+def test_a_robot_of_unknown_radius_looks_ahead_as_far_as_its_layers_say_it_reaches(own, layers, free_to):
+    vertices, faces = heightfield_mesh(np.zeros((21, 41)), 0.1, 0.1)
+    parameters = MeshMapParameters(
+        layers=[{"name": "wall", "type": "keepout"}, {"name": "inflation", "type": "inflation", "inputs": ["wall"]}],
+        inscribed_radius=own,
+    )
+    wall = {"polygon": ((1.95, -1.0), (4.0, -1.0), (4.0, 3.0), (1.95, 3.0))}
+    radii = {"inscribed_radius": layers, "inflation_radius": 0.4, "inscribed_value": 0.5}
+    blocks = {"wall": {"regions": [wall]}, "inflation": radii}
+    mesh_map = build_mesh_map(parameters, blocks, vertices=vertices, faces=faces)
+    free = [x for x in (1.5, 1.6, 1.7, 1.8) if not mesh_map.obstacle_ahead(Pose.planar(x, 1.0), Twist.planar(0.1), 0.1)]
+    assert free[-1] == free_to
