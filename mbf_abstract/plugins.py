@@ -161,9 +161,9 @@ class PlanRequest:
 class PlanResult(PluginResult):
     """Answer of a planner: an outcome of ``GetPathOutcome`` (or a plugin's own), a text, the path and its cost.
 
-    A cost of exactly 0 is replaced by the path's length. ``permanent`` marks a failure that planning again cannot
-    change, whatever the sensors see: the goal ends at once, without retries and recoveries. It is set for OUT_OF_MAP,
-    INVALID_START and INVALID_GOAL.
+    A cost of exactly 0 is replaced by the path's length. ``permanent`` marks a failure that planning again from the
+    same start cannot change, whatever the sensors see: the goal ends at once, without retries and, but for
+    BLOCKED_START, recoveries. It is set for OUT_OF_MAP, INVALID_START and INVALID_GOAL.
     """
 
     path: Path | None = None

@@ -69,7 +69,7 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         # 3. Plan; where there is no path for this planner there may be one for the other.
         fallback = self._fallback_of(plugin)
         first = self._plan(job, plugin, request, area, has_fallback=bool(fallback))
-        if not fallback or first.permanent or first.outcome not in FALLBACK_OUTCOMES or handle.cancel_requested:
+        if not fallback or first.is_final or first.outcome not in FALLBACK_OUTCOMES or handle.cancel_requested:
             return first
         if problem := self._plugins.problem(self.kind, fallback):
             return replace(first, message=f"{first.message}; fallback_planner: {problem}")

@@ -139,7 +139,7 @@ class MoveBaseMachine:
             return None
         if self._goals.follow is None:
             failure = (result.outcome, self._via.described(result.message))
-            return failure if result.permanent else self._recover_from(Trigger.PLAN, failure)
+            return failure if result.is_final else self._recover_from(Trigger.PLAN, failure)
         return self._on_replan_failed(result)
 
     def _on_replan_failed(self, result: GetPathResult) -> End | None:
@@ -149,7 +149,7 @@ class MoveBaseMachine:
         if policy == "keep" and not outdated:
             return None
         failure = (result.outcome, f"replanning failed: {self._via.described(result.message)}")
-        if (policy == "stop" and not taken_over) or (result.permanent and outdated):
+        if (policy == "stop" and not taken_over) or (result.is_final and outdated):
             return self._end_after_stop(failure)
         self._stop_then_recover(Trigger.PLAN, failure)
         return None

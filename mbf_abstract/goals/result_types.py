@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.outcomes import is_success, outcome_name
+from mbf_abstract.outcomes import GetPathOutcome, is_success, outcome_name
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class GetPathResult(ActionResult):
     """Path in the global frame and its cost (the path's length where the planner gives none).
 
     ``plugin_outcome`` and ``plugin_message`` are the planner's last result, also where patience ran out.
-    ``permanent`` says of a failure that planning anew cannot change it.
+    ``permanent`` says of a failure that planning anew, from the same start, cannot change it.
     """
 
     path: Path | None = None
@@ -44,6 +44,11 @@ class GetPathResult(ActionResult):
     plugin_outcome: int | None = None
     plugin_message: str = ""
     permanent: bool = False
+
+    @property
+    def is_final(self) -> bool:
+        """Whether nothing changes a failure: a recovery moves a robot off a blocked start, but opens no walls."""
+        return self.permanent and self.outcome != GetPathOutcome.BLOCKED_START
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ from mbf_costmap_nav.planning.car_search import CarLeg, Driving, search_drive
 from mbf_costmap_nav.planning.car_world import CarWorkspace, CarWorld
 from mbf_costmap_nav.planning.grid_planning import check_tolerance, marked_if_permanent, off_map
 from mbf_costmap_nav.planning.path_assembly import heights_along
+from mbf_costmap_nav.planning.permanent_walls import is_in_walls, touches_walls
 from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
 
 FloatArray = NDArray[np.float64]
@@ -95,7 +96,7 @@ class HybridAStarPlanner(CostmapPlanner):
         legs: list[CarLeg] = []
         failure = self._misfit(world, "start", request.start)
         if failure is not None and failure.outcome == GetPathOutcome.BLOCKED_START:
-            failure = replace(failure, message=f"{failure.message}; {getting_free(self.costmap, request.start)}")
+            failure = self._blocked_start(failure, world, request.start)
         for number, (start, goal) in enumerate(pairwise((request.start, *request.via, request.goal))):
             is_last = number == len(request.via)
             tolerance = request.dist_tolerance if is_last else 0.0
@@ -180,6 +181,12 @@ class HybridAStarPlanner(CostmapPlanner):
             return failure
         text = "" if OVER_BORDER in failure.message else f"; {OVER_BORDER}"
         return replace(failure, message=failure.message + text, permanent=True)
+
+    def _blocked_start(self, failure: PlanResult, world: CarWorld, start: Pose) -> PlanResult:
+        """The failure of a start with how the robot gets away; permanent where a border or a wall that stays is met."""
+        over_border = world.leaves_map(start) and not self.costmap.rolling_window
+        stays = over_border or is_in_walls(self.costmap, start) or touches_walls(self.costmap, start)
+        return replace(failure, message=f"{failure.message}; {getting_free(self.costmap, start)}", permanent=stays)
 
     def _misfit(self, world: CarWorld, name: str, pose: Pose, tolerance: float = 0.0) -> PlanResult | None:
         """Why nothing can be planned to or from a pose, if that is known without a search."""

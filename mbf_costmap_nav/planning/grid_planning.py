@@ -28,7 +28,7 @@ from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.planning.manoeuvres import Fitted
 from mbf_costmap_nav.planning.path_assembly import assembled
 from mbf_costmap_nav.planning.path_fitting import PathFitting, shifted_request
-from mbf_costmap_nav.planning.permanent_walls import is_permanently_unreachable
+from mbf_costmap_nav.planning.permanent_walls import is_in_walls, is_permanently_unreachable
 from mbf_costmap_nav.planning.search_grid import Cell, GridPlannerParameters, SearchGrid, SearchWorkspace
 from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
 
@@ -161,7 +161,8 @@ class GridPlanner(CostmapPlanner):
             return off_map(grid.costmap, start, "start")
         if grid.is_blocked(cell):
             text = f"{self._blocked(grid, 'start', start, cell)}; {getting_free(self.costmap, start)}"
-            return PlanResult(GetPathOutcome.BLOCKED_START, text)
+            stays = is_in_walls(self.costmap, start, self.parameters.lethal_cost)
+            return PlanResult(GetPathOutcome.BLOCKED_START, text, permanent=stays)
         return None
 
     def _check_goal(self, grid: SearchGrid, goal: Pose, tolerance: float, name: str) -> PlanResult | None:

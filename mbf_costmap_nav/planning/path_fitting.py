@@ -26,6 +26,7 @@ from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.map.pose_checks import find_valid_pose
 from mbf_costmap_nav.planning.manoeuvres import Fitted, Manoeuvres, Misfit
+from mbf_costmap_nav.planning.permanent_walls import touches_walls
 from mbf_costmap_nav.planning.search_grid import GridPlannerParameters
 
 FloatArray = NDArray[np.float64]
@@ -74,7 +75,7 @@ class PathFitting:
         if not touched:
             return None
         text = f"the robot touches {touched} at the start {_text(start)}; {getting_free(self._costmap, start)}"
-        return PlanResult(GetPathOutcome.BLOCKED_START, text)
+        return PlanResult(GetPathOutcome.BLOCKED_START, text, permanent=touches_walls(self._costmap, start))
 
     def fitting_goal(self, request: PlanRequest) -> Pose | PlanResult:
         """Return the goal or, where the outline does not fit, the nearest pose within the tolerances where it does."""

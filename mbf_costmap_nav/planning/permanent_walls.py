@@ -1,4 +1,4 @@
-"""Whether a goal is permanently unreachable: separated by walls and keep-out areas alone.
+"""Whether a goal is permanently unreachable, or a start blocked: by walls and keep-out areas alone.
 
 On the current map a wall and a movable box look the same. So the search is repeated on the map of those layers that no
 sensor writes: where even that has no path, waiting and trying again are useless.
@@ -13,12 +13,28 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN, Costmap
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 
 EIGHT_NEIGHBOURS = np.ones((3, 3), dtype=bool)
 
 _pieces_of: WeakKeyDictionary[Costmap, dict[int, NDArray[np.unsignedinteger]]] = WeakKeyDictionary()
 """Connected pieces of free space by the least cost that is not free; the costmap is the same until walls change."""
+
+
+def is_in_walls(costmap: LayeredCostmap, pose: Pose, lethal_cost: int = INSCRIBED) -> bool:
+    """Whether permanent walls cover the cell of a pose; ``lethal_cost`` is the planner's."""
+    walls = costmap.permanent_costmap()
+    cell = None if walls is None else walls.world_to_cell(pose.x, pose.y)
+    return walls is not None and cell is not None and max(lethal_cost, INSCRIBED) <= walls.cost(*cell) != UNKNOWN
+
+
+def touches_walls(costmap: LayeredCostmap, pose: Pose) -> bool:
+    """Whether the robot's outline touches a permanent wall at a pose."""
+    walls = costmap.permanent_costmap()
+    if walls is None:
+        return False
+    return FootprintCheck(costmap.footprint, walls.resolution).touched(walls, pose.x, pose.y, pose.yaw) is not None
 
 
 def is_permanently_unreachable(

@@ -43,7 +43,7 @@ from mbf_mesh_nav.tiles.tiled_plan import TiledPlan
 AT_VERTEX = 1e-6
 """How far [m] a vertex may be from itself on the surface: rounding."""
 
-STAYING = (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_GOAL)
+STAYING = (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_START, GetPathOutcome.BLOCKED_GOAL)
 """Outcomes that planning again cannot change where no sensor has a part in them."""
 STORED = "so it is without what sensors see"
 

@@ -1,4 +1,4 @@
-"""Whether a goal on a mesh is permanently unreachable: separated by ground that no sensor can open.
+"""Whether a goal on a mesh is permanently unreachable, or a start blocked: by ground that no sensor can open.
 
 On the map of the moment a wall and a movable box look the same. So the search is repeated with what is lethal in layers
 that depend on the mesh and their parameters alone: where even that leaves no way, waiting and trying again are useless.
@@ -21,13 +21,17 @@ from mbf_mesh_nav.layers.inflation import InflationLayer
 from mbf_mesh_nav.map.height_error import HeightErrorParameters, errors_for
 from mbf_mesh_nav.map.layer import MeshLayer
 from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.surface_point import nearest_corner
 
 
 def as_permanent(problem: PlanResult, mesh_map: MeshMap, request: PlanRequest, index: int) -> PlanResult:
-    """A failure of the way to via pose ``index``, counted from 1, or to the goal behind the last of them.
+    """A failure of the start, or of the way to via pose ``index``, counted from 1, or to the goal behind them.
 
-    It is permanent where such ground separates the pose from the start. A tolerance is that of the goal.
+    It is permanent where the start lies on such ground, or where that separates the pose from it. A tolerance is that
+    of the goal.
     """
+    if problem.outcome == GetPathOutcome.BLOCKED_START:
+        return replace(problem, permanent=is_on_walls(mesh_map, request.start))
     if problem.permanent or problem.outcome not in (GetPathOutcome.BLOCKED_GOAL, GetPathOutcome.NO_PATH_FOUND):
         return problem
     is_last = index > len(request.via)
@@ -44,9 +48,7 @@ def what_separates(mesh_map: MeshMap, start: Pose, goal: Pose, tolerance: float)
     is empty for a start on such ground, for poses off the surface, and wherever other ground might be opened.
     """
     walls = permanent_layers(mesh_map)
-    closed = np.zeros(mesh_map.topology.vertex_count, dtype=np.bool_)
-    for layer in walls:
-        closed |= layer.lethal_for_good
+    closed = _closed_by(walls, mesh_map)
     ends = mesh_map.locate([start.position, goal.position], np.inf).faces
     if (ends < 0).any() or not closed.any():
         return ()
@@ -61,6 +63,20 @@ def what_separates(mesh_map: MeshMap, start: Pose, goal: Pose, tolerance: float)
         return ()
     merged = [layer.name for layer in walls if not isinstance(layer, CombinationLayer) and layer.lethal.any()]
     return tuple(sorted(merged) or [layer.name for layer in walls])
+
+
+def is_on_walls(mesh_map: MeshMap, pose: Pose) -> bool:
+    """Whether the vertex nearest to a pose is such ground."""
+    place = mesh_map.locate_one(pose.position)
+    return place is not None and bool(_closed_by(permanent_layers(mesh_map), mesh_map)[nearest_corner(mesh_map, place)])
+
+
+def _closed_by(layers: list[MeshLayer], mesh_map: MeshMap) -> BoolArray:
+    """Vertices (V,) that are lethal for good in any of some layers."""
+    closed = np.zeros(mesh_map.topology.vertex_count, dtype=np.bool_)
+    for layer in layers:
+        closed |= layer.lethal_for_good
+    return closed
 
 
 def permanent_layers(mesh_map: MeshMap) -> list[MeshLayer]:

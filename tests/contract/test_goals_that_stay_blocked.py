@@ -1,4 +1,4 @@
-"""A goal that no sensor can open ends at once, with its own outcome, on both maps; one behind a box is tried again."""
+"""A goal or a start that no sensor can open ends at once, with its own outcome; one on a box is tried again."""
 
 import networkx as nx
 import numpy as np
@@ -26,7 +26,7 @@ WALL = [[3.0, -1.0], [3.3, -1.0], [3.3, 4.0], [3.0, 4.0]]
 CONFIGURATIONS = {
     "costmap": """
 backend: costmap
-planners: [{name: planner, type: dijkstra}]
+planners: [{name: planner, type: PLANNER}]
 global_costmap:
   robot_radius: 0.1
   layers:
@@ -55,7 +55,9 @@ mesh_map:
   inflation: {inscribed_radius: 0.1, inflation_radius: 0.3, lethal_value: .inf}
 """,
 }
-PLANNERS = [("costmap", ""), ("mesh", "dijkstra"), ("mesh", "any_angle"), ("mesh", "cvp")]
+RECOVERY = "recovery_behaviors: [{name: escape, type: escape}]\ncontrollers: [{name: controller, type: follow_path}]"
+PLANNERS = [("costmap", "dijkstra"), ("mesh", "dijkstra"), ("mesh", "any_angle"), ("mesh", "cvp")]
+STARTS = [*PLANNERS, ("costmap", "hybrid_astar"), ("costmap", "theta_star")]
 
 
 @pytest.fixture
@@ -67,10 +69,10 @@ def room(tmp_path):
     trimesh.Trimesh(vertices, faces, process=False).export(tmp_path / "room.ply")
     sessions = []
 
-    def open_session(backend, planner, area):
+    def open_session(backend, planner, area, start=(1.0, 1.5), more=""):
         text = CONFIGURATIONS[backend].replace("AREA", str(area)).replace("PLANNER", planner)
-        (tmp_path / "navigation.yaml").write_text(text)
-        session = LoopbackSession(Pose.planar(1.0, 1.5))
+        (tmp_path / "navigation.yaml").write_text(text + more)
+        session = LoopbackSession(Pose.planar(*start))
         sessions.append(session)
         session.serve(*read_config(tmp_path / "navigation.yaml"), session.robot, session.transforms)
         return session
@@ -104,11 +106,42 @@ def test_a_goal_behind_a_wall_has_no_path_at_once(room, backend, planner):
     assert result.outcome == GetPathOutcome.NO_PATH_FOUND and result.permanent and took < 0.5
 
 
+def see(session, x, y):
+    """A scan of something of 0.2 m."""
+    hits = np.array([[x + dx, y + dy, 0.1] for dx in (-0.1, 0.0, 0.1) for dy in (-0.1, 0.0, 0.1)])
+    session.navigator.server.take_scan(RangeScan.of_points("lidar", hits, (x - 0.6, y, 0.1), 0.0, "map"))
+
+
+@pytest.mark.parametrize(("backend", "planner"), STARTS)
+@pytest.mark.parametrize("start", [(4.6, 1.5), (3.92, 1.5)], ids=["inside", "beside"])
+def test_a_start_in_a_keep_out_area_is_blocked_at_once(room, backend, planner, start):
+    session = room(backend, planner, FORBIDDEN, start)
+    before = session.clock.now()
+    result = session.navigator.get_path(session.navigator.ground_pose(1.0, 1.5))
+    may_open = backend == "mesh" and start[0] < 4.0  # inflated ground, which ``relax`` makes smaller
+    assert result.outcome == (GetPathOutcome.PAT_EXCEEDED if may_open else GetPathOutcome.BLOCKED_START), result.message
+    assert result.permanent != may_open and (session.clock.now() - before < 0.5) != may_open
+
+
+@pytest.mark.parametrize(("backend", "planner"), STARTS)
+def test_a_robot_that_starts_there_still_recovers(room, backend, planner):
+    session = room(backend, planner, FORBIDDEN, (4.2, 1.5), RECOVERY)
+    result = session.navigator.go_to(session.navigator.ground_pose(1.0, 1.5))
+    assert result.success and session.clock.now() < 25.0, result.message
+
+
+@pytest.mark.parametrize(("backend", "planner"), STARTS)
+def test_a_start_on_something_seen_is_tried_again(room, backend, planner):
+    session = room(backend, planner, [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1]], (4.6, 1.5))
+    see(session, 4.6, 1.5)
+    result = session.navigator.get_path(session.navigator.ground_pose(1.0, 1.5))
+    assert result.outcome == GetPathOutcome.PAT_EXCEEDED and not result.permanent, result.message
+
+
 @pytest.mark.parametrize(("backend", "planner"), PLANNERS[:2])
 def test_a_goal_on_something_seen_is_tried_again(room, backend, planner):
     session = room(backend, planner, [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1]])
-    hits = np.array([[4.6 + dx, 1.5 + dy, 0.1] for dx in (-0.1, 0.0, 0.1) for dy in (-0.1, 0.0, 0.1)])
-    session.navigator.server.take_scan(RangeScan.of_points("lidar", hits, (4.0, 1.5, 0.1), 0.0, "map"))
+    see(session, 4.6, 1.5)
     result, took = plan(session)
     assert result.outcome == GetPathOutcome.PAT_EXCEEDED and not result.permanent and took > 2.0
 

@@ -61,3 +61,16 @@ def test_what_may_change_is_tried_again(make_session):
     session.planner.play(PlanResult(GetPathOutcome.NO_PATH_FOUND, "somebody is in the way"), straight_plan)
     assert session.navigator.send(GetPathGoal(Pose.planar(2.0, 0.0))).wait().success
     assert len(session.planner.requests) == 2
+
+
+BLOCKED_START = PlanResult(GetPathOutcome.BLOCKED_START, "in a keep-out area", permanent=True)
+
+
+def test_a_start_that_stays_blocked_is_asked_once_but_a_robot_may_be_moved_off_it(make_session):
+    session = make_session()
+    session.planner.play(BLOCKED_START)
+    assert session.navigator.send(GetPathGoal(FAR)).wait().outcome == GetPathOutcome.BLOCKED_START
+    assert len(session.planner.requests) == 1
+    session.planner.play(BLOCKED_START, straight_plan)
+    assert session.navigator.send(MoveBaseGoal(Pose.planar(2.0, 0.0))).wait().success
+    assert len(session.recorded(EventKind.RECOVERY)) == 1

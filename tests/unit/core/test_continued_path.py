@@ -77,7 +77,9 @@ def test_that_the_way_to_the_end_is_tight_holds_for_an_end_as_near(end, is_close
 def make_room(room, tracker, x):
     """One cycle in which a turn on the spot is blocked, and a curve is driven."""
     tracker.update((x, 0.0))
-    return room.choose(Pose.planar(x, 0.0), tracker.progress, [TURN, CURVE], 0.3, lambda motion: "" if motion.vx else "x")
+    return room.choose(
+        Pose.planar(x, 0.0), tracker.progress, [TURN, CURVE], 0.3, lambda motion: "" if motion.vx else "x"
+    )
 
 
 def test_making_room_is_counted_over_all_plans():
