@@ -12,6 +12,7 @@ import typer
 from mbf_abstract.commands.reporting import readable_errors
 from terrain.commands.command_line import command_line
 from terrain.commands.completion import SCENARIO
+from terrain.commands.counted import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -65,7 +66,7 @@ def sweep(
         hashed, console = hash_of(loaded), Console()
         with SweepLog(out / "runs.jsonl") as log:
             left = [run for run in planned if not is_done(log.rows.get(run.key(hashed)), keep)]
-            console.print(f"{len(planned)} runs, {len(planned) - len(left)} of them done before")
+            console.print(f"{counted(len(planned), 'run')}, {len(planned) - len(left)} of them done before")
             for run in left:
                 log.forget(run.key(hashed))
             jobs = [(loaded, run) for run in left]

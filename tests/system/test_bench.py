@@ -61,7 +61,8 @@ def test_the_first_command_of_the_page_judges_its_planner_and_a_second_one_drive
     log = (folder / "runs.jsonl").read_bytes()
     (run,) = json.loads((folder / "results.json").read_text())["runs"]
     assert run["success"] and run["route"] and run["entry"] == "straight_planner:StraightPlanner"
-    assert "straight_planner:StraightPlanner" in (folder / "leaderboard.html").read_text()
+    page = (folder / "leaderboard.html").read_text()
+    assert "straight_planner:StraightPlanner" in page and " 1 world; protocol" in page
 
     again = CliRunner().invoke(make_app(), [*arguments, "--json"])
 

@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 
 from mbf_abstract.whole_files import write_whole
+from terrain.commands.counted import counted
 from terrain.experiments.evaluation.bench import Asked, Judged, drive, entries_of, show
 from terrain.experiments.evaluation.leaderboard import failures_text
 from terrain.experiments.evaluation.protocol import Protocol
@@ -39,7 +40,7 @@ def overview(sets: Sequence[Judged], command: str) -> str:
     parts = [f"<p>Driven with: {html.escape(command)}.</p>"]
     for judged in sets:
         link = f'<a href="{judged.out.name}/leaderboard.html">{html.escape(judged.title)}</a>'
-        text = f"{len(judged.protocol.trials)} worlds, protocol hash {judged.protocol.hash}"
+        text = f"{counted(len(judged.protocol.trials), 'world')}, protocol hash {judged.protocol.hash}"
         parts += [f"<h2>{link}</h2><p>{html.escape(text)}</p>", html_table(_lines(judged))]
     return html_page("mbf bench all", parts)
 

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from mbf_abstract.event_values import well_formed
 from mbf_abstract.whole_files import write_whole
+from terrain.commands.counted import counted
 from terrain.commands.verdict_line import TERMINAL_COLOURS
 from terrain.experiments.evaluation.entrant import entrant
 from terrain.experiments.evaluation.joining import join
@@ -101,7 +102,7 @@ def drive(protocol: Protocol, entries: list[Entry], asked: Asked, console: Conso
 def show(judged: Judged, console: Console) -> None:
     """Print the table, settings that are not the protocol's, why the user's entry fails, and where the files are."""
     protocol, lines = judged.protocol, judged.lines
-    title = f"{judged.title}, {len(protocol.trials)} worlds, protocol {protocol.hash}"
+    title = f"{judged.title}, {counted(len(protocol.trials), 'world')}, protocol {protocol.hash}"
     console.print(terminal_table(lines, title))
     known = {name: described(entry) for name, entry in protocol.entries.items()}
     texts = [
@@ -143,7 +144,8 @@ def _reporter(console: Console) -> Callable[[dict[str, Any]], None]:
 def _about(head: dict[str, Any]) -> list[str]:
     protocol = head["protocol"]
     return [
-        f"{protocol['about']} {protocol['trials']} worlds; protocol {protocol['version']}, hash {protocol['hash']}.",
+        f"{protocol['about']} {counted(protocol['trials'], 'world')}; protocol {protocol['version']}, "
+        f"hash {protocol['hash']}.",
         f"A success: {protocol['rules']['success']}. Rates are over the worlds that have a route by the judge. Ranked "
         "by successes, then by SPL (success weighted by path length); who did not drive all worlds has no rank.",
         f"Driven with: {head['command']} (mbf-flex {head['version']}).",

@@ -1,6 +1,7 @@
 """move_base: a robot in a manoeuvre does not take over another one that is no shorter."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from mbf_abstract.testing.scripted import straight_plan
 
 def along(*corners, step=0.1):
     """A path along x by corners [m], driven with the heading 0."""
-    parts = [np.arange(a, b, np.copysign(step, b - a)) for a, b in zip(corners, corners[1:], strict=False)]
+    parts = [np.arange(a, b, np.copysign(step, b - a)) for a, b in pairwise(corners)]
     return Path.from_poses([Pose.planar(float(x), 0.0) for x in [*np.concatenate(parts), corners[-1]]])
 
 
