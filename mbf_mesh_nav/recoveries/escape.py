@@ -5,6 +5,8 @@ BLOCKED_START. It crosses costly surface on purpose, so it is slow, short (``max
 the surface, never across a gap or to another storey. It crosses lethal surface only where the robot stands on it,
 without knowing the obstacle: order it after ``clear`` and ``back_up``. Where an obstacle appears on the escape path
 while it drives, or the end of the path is no longer safe, it searches for another path and stops if there is none.
+A robot that cannot turn on the spot, as a car, or must not, as on a steep slope, drives the shortest manoeuvre out
+instead: forward and backward, in curves it can drive. Its centre crosses what the path might.
 """
 
 from __future__ import annotations
@@ -16,9 +18,11 @@ import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.geometry.arcs import arc_to
+from mbf_abstract.geometry.arcs import arc_poses, arc_to
 from mbf_abstract.geometry.tangent_plane import ground_distance
-from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
+from mbf_abstract.maps.controllers.failures import obstacle_text
+from mbf_abstract.maps.manoeuvres import LEAST_RADIUS, find_manoeuvre
+from mbf_abstract.maps.recoveries.manoeuvre_recovery import ManoeuvreParameters, ManoeuvreRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
@@ -26,16 +30,22 @@ from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.search.dijkstra import follow_predecessors, propagate_distances
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE
+from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.mesh.surface_point import nearest_corner
+from mbf_mesh_nav.mesh.turning import slope_at
 from mbf_mesh_nav.motion.goal_approach import clamp
+from mbf_mesh_nav.motion.leaving_surface import LeavingSurface
 from mbf_mesh_nav.plugins import MeshRecovery
 from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, search_graph, seeded_arrays, threshold_step
 
-SURFACE_DISTANCE = 1.0
-"""A robot farther [m] from the surface is not on it."""
+LOOK_STEP = 0.05
+"""Distance [m] of the places that a motion in curves is looked at."""
+ATTEMPTS = 3
+"""How often a manoeuvre is searched: one may end a little short of its place, or be refused on the way."""
 
 
-class EscapeParameters(GuardedMotionParameters):
+class EscapeParameters(ManoeuvreParameters):
     """Parameters of ``mesh.escape``."""
 
     cost_limit: float = parameter(0.9, "Surface is safe below this cost.", gt=0.0, allow_inf=True)
@@ -67,11 +77,12 @@ class EscapePath:
         return not (lethal[ahead].any() or blocked[self.vertices[-1]])
 
 
-class EscapeRecovery(MeshRecovery, GuardedRecovery):
+class EscapeRecovery(MeshRecovery, ManoeuvreRecovery):
     """Drives to the nearest safe surface."""
 
     Parameters = EscapeParameters
     parameters: EscapeParameters
+    _own_patch: BoolArray
 
     @classmethod
     def reach(cls, parameters: EscapeParameters) -> float:
@@ -89,6 +100,9 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
         if not snapshot.blocked(p.cost_limit)[mesh_map.faces[spot.face]].any():
             return RecoveryResult(RecoveryOutcome.SUCCESS, "the robot stands on a safe surface")
         own_patch = self._patch_below(spot, snapshot, flag)
+        steep = slope_at(mesh_map.topology, spot) > mesh_map.max_turning_slope
+        if radius := self.min_turning_radius or steep * LEAST_RADIUS:
+            return self._leave_in_curves(own_patch, radius, request)
         path = self._escape_path(spot, own_patch, request)
 
         def velocity(pose: Pose) -> Twist | RecoveryResult:
@@ -100,11 +114,46 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
                     here = mesh_map.locate_one(pose.position, SURFACE_DISTANCE)
                     path = None if here is None else self._escape_path(here, own_patch, request)
             if path is None:
-                message = f"no safe surface within {p.max_distance:g} m along the surface"
-                return RecoveryResult(RecoveryOutcome.IMPASSABLE, message)
+                return self._nowhere("along the surface")
             return self._drive(pose, path.tracker)
 
         return self.drive(request, velocity)
+
+    def _nowhere(self, by: str) -> RecoveryResult:
+        text = f"no safe surface within {self.parameters.max_distance:g} m {by}"
+        return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
+
+    def _leave_in_curves(self, own_patch: BoolArray, radius: float, request: RecoveryRequest) -> RecoveryResult:
+        """Drive the shortest manoeuvre with curves of a radius [m] at least; search anew where it ends short."""
+        p, mesh_map, token, self._own_patch = self.parameters, self.mesh_map, request.cancel_token, own_patch
+        result = self._nowhere("by a manoeuvre")
+        for _ in range(ATTEMPTS):
+            begin = self.on_map(request.motion.pose())
+            spot = mesh_map.locate_one(begin.position, SURFACE_DISTANCE)
+            if spot is None:
+                break
+            distances, _, safe = self._reached(spot, own_patch, request)
+            if safe[nearest_corner(mesh_map, spot)]:
+                return RecoveryResult(RecoveryOutcome.SUCCESS, "reached a safe surface")
+            maps = LeavingSurface(mesh_map, begin, np.isfinite(distances), safe & np.isfinite(distances))
+            steps = find_manoeuvre(maps.may_pass, maps.left, p.max_distance, radius, lambda: token.cancelled)
+            if token.cancelled:
+                return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
+            if steps is None:
+                return self._nowhere("by a manoeuvre")
+            result = self.drive_along(begin, steps, request)
+            if result.outcome not in (RecoveryOutcome.SUCCESS, RecoveryOutcome.IMPASSABLE):
+                break
+        return result
+
+    def obstacle_on_manoeuvre(self, pose: Pose, command: Twist) -> str:
+        """Lethal surface that the robot's centre would come to, but for what it stood on, on the current map."""
+        closed, duration, there = _lethal(self.mesh_map.snapshot()), self.parameters.check_ahead_time, self.on_map(pose)
+        surface = LeavingSurface(self.mesh_map, there, ~closed | self._own_patch, closed)
+        motion = command.vx, command.vy, command.wz, duration, min(LOOK_STEP / max(command.speed, 1e-6), duration)
+        ahead = map(tuple, arc_poses((0.0, 0.0, 0.0), *motion).tolist())
+        hit = next((one for one in ahead if not surface.may_pass(one)), None)
+        return "" if hit is None else obstacle_text(position_text(surface.on_map(hit).position))
 
     def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
         """Always empty: it checks its path itself, which leads over forbidden surface on purpose."""
@@ -133,12 +182,8 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
 
         It leads over costly surface, and of lethal vertices (V,) only over those of ``own_patch``.
         """
-        mesh_map, snapshot = self.mesh_map, self.mesh_map.snapshot()
-        blocked = snapshot.blocked(self.parameters.cost_limit)
-        distances, predecessors = self._propagate(spot, _lethal(snapshot) & ~own_patch, request.cancel_token.flag)
-        beside_blocked = blocked[mesh_map.edges].any(axis=1)
-        safe = ~blocked
-        safe[mesh_map.edges[beside_blocked].ravel()] = False
+        mesh_map = self.mesh_map
+        distances, predecessors, safe = self._reached(spot, own_patch, request)
         candidates = np.where(safe, distances, np.inf)
         nearest = int(np.argmin(candidates))
         if not candidates[nearest] <= self.parameters.max_distance:
@@ -146,6 +191,17 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
         chain = follow_predecessors(predecessors, nearest)[::-1]
         points = np.concatenate([[spot.point], mesh_map.vertices[chain]])
         return EscapePath(chain, PathTracker(Path.from_points(points, frame_id=mesh_map.frame_id)))
+
+    def _reached(
+        self, spot: SurfacePoint, own_patch: BoolArray, request: RecoveryRequest
+    ) -> tuple[Float32Array, IntArray, BoolArray]:
+        """As ``_propagate``, on the current map, and the vertices (V,) around which no face is forbidden."""
+        mesh_map, snapshot = self.mesh_map, self.mesh_map.snapshot()
+        blocked = snapshot.blocked(self.parameters.cost_limit)
+        beside_blocked = blocked[mesh_map.edges].any(axis=1)
+        safe = ~blocked
+        safe[mesh_map.edges[beside_blocked].ravel()] = False
+        return *self._propagate(spot, _lethal(snapshot) & ~own_patch, request.cancel_token.flag), safe
 
     def _propagate(self, spot: SurfacePoint, closed: BoolArray, flag: FlagArray) -> tuple[Float32Array, IntArray]:
         """Lengths of the paths from the robot to all vertices but the ``closed`` ones, and their predecessors."""

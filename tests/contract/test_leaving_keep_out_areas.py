@@ -155,8 +155,10 @@ def test_escape_of_a_closed_in_robot_is_impassable_with_the_area(room):
     assert "lethal in layer stairs (zone 'stairway')" in result.message
 
 
-def test_a_car_leaves_an_area_in_curves_it_can_drive(room):
-    session = room("costmap, one map", (3.2, 3.0, 1.57), min_turning_radius=0.6)
+@pytest.mark.parametrize("pose", [(3.2, 3.0, 1.57), (3.2, 3.0, 0.0), (3.3, 2.3, -2.4)])
+@pytest.mark.parametrize("backend", ["costmap, one map", "mesh"])
+def test_a_car_leaves_an_area_in_curves_it_can_drive(room, backend, pose):
+    session = room(backend, pose, min_turning_radius=0.6)
     handle = session.navigator.send(RecoveryGoal("escape"))
     while not handle.done:
         session.clock.sleep(0.05)

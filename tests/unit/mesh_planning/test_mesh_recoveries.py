@@ -49,6 +49,17 @@ class SimulatedMotion:
         return self.stop_after > 0
 
 
+class CarEscape(EscapeRecovery):
+    """Of a robot that cannot turn on the spot."""
+
+    def __init__(self, context):
+        super().__init__(context)
+        self.min_turning_radius = 0.6
+
+
+ESCAPES = pytest.mark.parametrize("escape", [EscapeRecovery, CarEscape])
+
+
 class TrackedRobot:
     """A robot that knows how it came here."""
 
@@ -176,19 +187,21 @@ def test_relaxed_inflation_comes_back_by_itself(run, plain, paint, make_plugin):
     np.testing.assert_array_equal(mesh_map.snapshot().costs, usual)
 
 
-def test_escaping_leaves_a_lethal_disc_by_the_shortest_way(run, plain, paint):
+@ESCAPES
+def test_escaping_leaves_a_lethal_disc_by_the_shortest_way(run, plain, paint, escape):
     mesh_map = paint(plain(spacing=0.1), lambda v: np.where(np.hypot(v[:, 0] - 3, v[:, 1] - 3) < 0.8, np.inf, 0.0))
-    result, motion = run(EscapeRecovery, mesh_map, (2.6, 3.0, 0.0), (1, 0, 0))
+    result, motion = run(escape, mesh_map, (2.6, 3.0, 0.0), (1, 0, 0))
     assert result.success, result.message
     assert motion.current.x < 2.25
-    result, motion = run(EscapeRecovery, mesh_map, tuple(motion.current.position))
+    result, motion = run(escape, mesh_map, tuple(motion.current.position))
     assert result.success and "safe surface" in result.message
-    result, _ = run(EscapeRecovery, mesh_map, (2.6, 3.0, 0.0), max_distance=0.2)
+    result, _ = run(escape, mesh_map, (2.6, 3.0, 0.0), max_distance=0.2)
     assert result.outcome == RecoveryOutcome.IMPASSABLE
 
 
+@ESCAPES
 @pytest.mark.parametrize("gap", [True, False], ids=["way round", "no way"])
-def test_escaping_does_not_drive_into_what_appears_on_its_way(run, plain, paint, gap):
+def test_escaping_does_not_drive_into_what_appears_on_its_way(run, plain, paint, escape, gap):
     mesh_map = plain(spacing=0.1)
     costly = np.where(np.hypot(*(mesh_map.vertices[:, :2] - 3.0).T) < 1.2, 0.95, 0.0).astype(np.float32)
     paint(mesh_map, lambda v: costly)
@@ -204,13 +217,16 @@ def test_escaping_does_not_drive_into_what_appears_on_its_way(run, plain, paint,
             assert not self.mesh_map.snapshot().lethal[self.mesh_map.faces[spot.face]].all()
             return super().sleep(seconds)
 
-    result, motion = run(EscapeRecovery, mesh_map, (3.7, 3.0, 0.0), motion_class=AppearingWall, max_distance=3.0)
+    result, motion = run(escape, mesh_map, (3.7, 3.0, 0.0), motion_class=AppearingWall, max_distance=3.0)
     assert result.outcome == (RecoveryOutcome.SUCCESS if gap else RecoveryOutcome.IMPASSABLE), result.message
     assert (np.hypot(motion.current.x - 3.0, motion.current.y - 3.0) > 1.1) == gap
     assert gap or np.hypot(motion.current.x - 3.7, motion.current.y - 3.0) < 0.4
 
 
-def test_escaping_ends_where_it_is_safe_even_if_the_end_of_the_way_becomes_forbidden_meanwhile(run, plain, paint):
+@ESCAPES
+def test_escaping_ends_where_it_is_safe_even_if_the_end_of_the_way_becomes_forbidden_meanwhile(
+    run, plain, paint, escape
+):
     mesh_map = plain(spacing=0.1)
     around = np.hypot(*(mesh_map.vertices[:, :2] - 3.0).T)
     paint(mesh_map, lambda v: np.where(around < 0.8, 0.95, 0.0))
@@ -222,29 +238,44 @@ def test_escaping_ends_where_it_is_safe_even_if_the_end_of_the_way_becomes_forbi
                 self.mesh_map.apply(lambda layer: layer.replace(costs, np.zeros(len(costs), dtype=np.bool_)))
             return super().sleep(seconds)
 
-    result, motion = run(EscapeRecovery, mesh_map, (3.5, 3.0, 0.0), motion_class=SpreadingInflation)
+    result, motion = run(escape, mesh_map, (3.5, 3.0, 0.0), motion_class=SpreadingInflation)
     assert result.success, result.message
     assert np.hypot(motion.current.x - 3.0, motion.current.y - 3.0) > 1.5
 
 
-def test_a_robot_beside_a_thin_wall_does_not_escape_through_it(run, plain, paint):
+@ESCAPES
+def test_a_robot_beside_a_thin_wall_does_not_escape_through_it(run, plain, paint, escape):
     def wall_with_a_wide_forbidden_band(v):
         corridor = np.where((v[:, 0] > 1.55) & (v[:, 0] < 3.25), 0.95, 0.0)
         return np.where(np.abs(v[:, 0] - 3.0) < 0.05, np.inf, corridor)
 
     mesh_map = paint(plain(spacing=0.1), wall_with_a_wide_forbidden_band)
-    result, motion = run(EscapeRecovery, mesh_map, (2.93, 3.03, 0.0), (-1, 0, 0))
+    result, motion = run(escape, mesh_map, (2.93, 3.03, 0.0), (-1, 0, 0))
     assert result.success, result.message
     assert motion.current.x < 1.65
 
 
-def test_a_robot_whose_frame_is_above_the_ground_ends_its_escape_at_safe_ground(run, plain, paint):
+@ESCAPES
+def test_a_robot_whose_frame_is_above_the_ground_ends_its_escape_at_safe_ground(run, plain, paint, escape):
     mesh_map = paint(plain(spacing=0.1), lambda v: np.where(np.hypot(v[:, 0] - 3, v[:, 1] - 3) < 0.8, np.inf, 0.0))
 
     class HighFrame(SimulatedMotion):
         def pose(self):
             return replace(self.current, position=(self.current.x, self.current.y, self.current.z + 0.4))
 
-    result, motion = run(EscapeRecovery, mesh_map, (2.6, 3.0, 0.0), motion_class=HighFrame)
+    result, motion = run(escape, mesh_map, (2.6, 3.0, 0.0), motion_class=HighFrame)
     assert result.success, result.message
     assert 1.9 < motion.current.x < 2.25
+
+
+def test_a_car_escapes_in_curves_it_can_drive_and_a_robot_on_a_steep_slope_does_not_turn(run, plain, paint):
+    mesh_map = paint(plain(spacing=0.1), lambda v: np.where(np.hypot(v[:, 0] - 3, v[:, 1] - 3) < 0.8, np.inf, 0.0))
+    for mesh_map.max_turning_slope, escape in ((0.35, CarEscape), (-1.0, EscapeRecovery)):
+        result, motion = run(escape, mesh_map, (3.4, 3.0, 0.0), (0, 1, 0))
+        assert result.success, result.message
+        assert all(abs(command.wz) * 0.4 <= abs(command.vx) for command in motion.commands)
+    result, motion = run(EscapeRecovery, mesh_map, (3.4, 3.0, 0.0), (0, 1, 0), max_distance=0.2)
+    assert (result.outcome, result.message) == (
+        RecoveryOutcome.IMPASSABLE,
+        "no safe surface within 0.2 m by a manoeuvre",
+    )
