@@ -18,7 +18,7 @@ from terrain.description.parameters import UrdfRobot
 from terrain.description.running_gear import RunningGear, note_on_its_side, sides_of, solids_of
 from terrain.description.solids import Placed
 from terrain.description.stability import Edges, Tipping, clear_angles, seen_from_the_side, tipping
-from terrain.description.urdf import Urdf, link_frames
+from terrain.description.urdf import Urdf, link_frames, subtree
 from terrain.description.urdf_reader import read_urdf
 from terrain.description.wheel_search import find_running_gear
 
@@ -26,6 +26,7 @@ UP = np.array([0.0, 0.0, 1.0])
 USUAL_SPEED = 1.0  # m/s, where the file states no speed of the wheels
 USUAL_YAW_RATE = 1.5  # rad/s
 USUAL_STEERING_ANGLE = 0.5  # rad
+STEERED = 9  # angles at which a steered wheel is looked at
 GRAVITY = 9.81
 SCRUB = 0.35  # of (wheelbase / track)^2: what a skid-steered robot of a Husky's wheels loses (see RobotSpec)
 DIGITS = 6
@@ -89,7 +90,7 @@ class _Describer:
             stated=stated,
             gear=gear,
             p_root_base=self.base,
-            footprint=self._footprint(everything),
+            footprint=self._footprint([*everything, *self._in_base(self._steered(wheelbase, track, steering))]),
             height=_rounded(stated.height or height),
             ground_clearance=_rounded(stated.ground_clearance or max(clearance, 0.0)),
             mass=_rounded(mass),
@@ -141,6 +142,17 @@ class _Describer:
         if not surrounds_base(few):
             self.notes.append("base_link lies outside of its footprint, which a costmap refuses; state footprint")
         return few
+
+    def _steered(self, wheelbase: float, track: float, steering: float) -> list[Placed]:
+        """Shapes of steered wheels in the root link, at angles up to that of the inner wheel in the tightest curve."""
+        joints = {wheel.steering for wheel in self.gear.wheels if wheel.steering}
+        if not joints or steering == 0.0:
+            return []
+        links = {link for name in joints for link in subtree(self.urdf, self.urdf.joints[name].child)}
+        inner = math.atan2(1.0, 1.0 / math.tan(steering) - 0.5 * track / wheelbase)
+        angles = np.linspace(-inner, inner, STEERED).tolist()
+        frames = [link_frames(self.urdf, dict.fromkeys(joints, angle)) for angle in angles]
+        return [solid for one in frames for solid in solids_of(self.urdf, one, links)]
 
     def _wheelbase(self) -> float:
         xs = [float(wheel.centre[0]) for wheel in self.gear.wheels]

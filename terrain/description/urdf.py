@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -103,14 +103,17 @@ def transform_of(xyz: Sequence[float], rpy: Sequence[float]) -> FloatArray:
     )
 
 
-def link_frames(urdf: Urdf) -> dict[str, FloatArray]:
-    """Where every link is in the root link, (4, 4), with all joints at zero or at their limit nearest to it."""
+def link_frames(urdf: Urdf, turned: Mapping[str, float] | None = None) -> dict[str, FloatArray]:
+    """Where every link is in the root link, (4, 4), with all joints at zero or at their limit nearest to it.
+
+    But for joints that are ``turned`` [rad], whatever their limits.
+    """
     frames = {urdf.root: np.eye(4)}
     for parent in subtree(urdf, urdf.root):
         for joint in urdf.joints.values():
             if joint.parent == parent:
                 position = min(max(0.0, joint.lower), joint.upper) if joint.kind != "fixed" else 0.0
-                T_joint_child = _moved(joint, position)
+                T_joint_child = _moved(joint, (turned or {}).get(joint.name, position))
                 T_parent_joint = joint.T_parent_joint
                 frames[joint.child] = frames[parent] @ (T_parent_joint @ T_joint_child)
     return frames

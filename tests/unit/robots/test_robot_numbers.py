@@ -85,8 +85,8 @@ def test_a_wheel_that_trails_behind_a_free_upright_axis_is_a_caster(described):
     assert [support.name for support in found.gear.supports] == ["roll"]
 
 
-def test_the_inner_wheel_of_a_car_limits_its_circle(described):
-    """Wheels that turn by 0.6 rad: the circle of the rear axle's middle has radius L cot(0.6) + T / 2."""
+def car():
+    """The box with front wheels that turn by 0.6 rad."""
     limits = '<limit lower="-0.6" upper="0.6" effort="1" velocity="1"/>'
     hinges = [
         link(f"{side}_hinge")
@@ -94,7 +94,23 @@ def test_the_inner_wheel_of_a_car_limits_its_circle(described):
         for side, y in (("left", 0.35), ("right", -0.35))
     ]
     front = [wheel(f"front_{side}", f"{side}_hinge", "0 0 0") for side in ("left", "right")]
-    found = described(robot(BODY, *hinges, *front, *FOUR_WHEELS[2:]))
+    return robot(BODY, *hinges, *front, *FOUR_WHEELS[2:])
+
+
+def test_the_footprint_of_a_car_holds_its_wheels_however_they_are_steered(described):
+    """A wheel of radius 0.2 m that is 0.1 m wide: its corner is 0.2 m ahead of, and 0.05 m beside, its hinge."""
+    found = described(car())
+    aside = max(y for _, y in found.footprint)
+    assert aside == pytest.approx(0.35 + 0.05 * math.cos(0.6) + 0.2 * math.sin(0.6), abs=1e-3)
+    assert max(y for x, y in found.footprint if x < 0.1) == pytest.approx(0.4, abs=1e-3)
+    less = described(car(), max_steering_angle=0.1)
+    assert 0.4 < max(y for _, y in less.footprint) < 0.43
+    assert described(robot(BODY, *FOUR_WHEELS)).footprint[0][1] == pytest.approx(-0.4)
+
+
+def test_the_inner_wheel_of_a_car_limits_its_circle(described):
+    """Wheels that turn by 0.6 rad: the circle of the rear axle's middle has radius L cot(0.6) + T / 2."""
+    found = described(car())
     assert found.drive == "ackermann"
     assert found.p_root_base[0] == -0.3
     assert found.min_turning_radius == pytest.approx(0.6 / math.tan(0.6) + 0.35, abs=1e-5)
