@@ -42,8 +42,6 @@ STANDING = 1.5
 """Who has been seen to stand for less than this [s] may be about to move."""
 MEETING = 6.0
 """Who came along the path and has stood for so long [s] before a robot that creeps does not go on before that one."""
-QUEUEING = 6
-"""So often the robot waits behind one that goes where it goes before it gives way."""
 CREEPING = 0.2
 """A robot slower than this [m/s] before somebody who stands is taken to be waited for."""
 
@@ -174,10 +172,9 @@ def _unblock(options: TreeOptions) -> Behaviour:
         Motion.MOVING: Recovery(o.wait),
         Motion.WAITING: _patient("yield", o, 2),
     }
-    came, went = _patient("yield at once", o, 0), _patient("follow", o, QUEUEING)
     if not o.reuse_path:  # every recovery that succeeds is followed by a plan; otherwise one that fails is
         by_motion[Motion.PARKED] = Success("plan around it at once")
-    return PickByMotion("who is in the way?", by_motion, usual, came, went, standing=STANDING)
+    return PickByMotion("who is in the way?", by_motion, usual, _patient("yield at once", o, 0), standing=STANDING)
 
 
 def _patient(name: str, options: TreeOptions, waits: int) -> Behaviour:

@@ -34,9 +34,8 @@ class PickByMotion(Composite):
         A motion that is missing makes the node fail. One node may stand for several motions, and for nobody.
     nobody : Behaviour
         Where no tracked object is in the way.
-    came, went : Behaviour, optional
-        For one that waits and was seen to come along the path, or to go where the robot goes, before it stood. None =
-        as ``by_motion`` has it.
+    came : Behaviour, optional
+        For one that waits and was seen to come along the path before it stood. None = as ``by_motion`` has it.
     length : float
         How far ahead along the path [m] counts.
     standing : float
@@ -53,15 +52,14 @@ class PickByMotion(Composite):
         by_motion: Mapping[Motion, Behaviour],
         nobody: Behaviour,
         came: Behaviour | None = None,
-        went: Behaviour | None = None,
         length: float = 3.0,
         standing: float = 0.0,
         margin: float = MARGIN,
     ) -> None:
-        special = [node for node in (came, went) if node is not None]
+        special = [] if came is None else [came]
         super().__init__(name, list(dict.fromkeys([*by_motion.values(), *special, nobody])))
         self.by_motion = dict(by_motion)
-        self.nobody, self.came, self.went = nobody, came, went
+        self.nobody, self.came = nobody, came
         self.length = length
         self.standing = standing
         self.margin = margin
@@ -75,8 +73,8 @@ class PickByMotion(Composite):
             return
         motion = first.by.motion if first.by.standing >= self.standing else Motion.MOVING
         self._picked = self.by_motion.get(motion)
-        if motion is Motion.WAITING and abs(first.along) >= ALONG:
-            self._picked = (self.came if first.along < 0.0 else self.went) or self._picked
+        if motion is Motion.WAITING and first.along <= -ALONG:
+            self._picked = self.came or self._picked
         self.feedback_message = f"{motion.value}, {first.distance:.1f} m ahead"
 
     def tick_children(self) -> Generator[Behaviour, None, Status]:
