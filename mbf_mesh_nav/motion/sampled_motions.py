@@ -18,6 +18,7 @@ from mbf_mesh_nav.motion.goal_approach import clamp
 
 _LEAST_STRIDE = 0.05  # [m] between two looks at the ground; only obstacles without inflation are thinner
 _NOISE_HOLD = 3  # steps a noise value is kept for: explores further than independent noise of the same size
+USUAL_WHEELBASE = 0.5  # [m] of a car that states none; it only scales the angles
 
 
 class MPPIParameters(PluginParameters):
@@ -31,7 +32,12 @@ class MPPIParameters(PluginParameters):
     max_vel_x: float = parameter(0.8, "Forward speed limit.", unit="m/s", gt=0.0, le=5.0)
     min_vel_x: float = parameter(0.0, "Least forward speed; negative allows reversing.", unit="m/s", le=0.0)
     max_vel_theta: float = parameter(1.0, "Yaw rate limit, in both directions.", unit="rad/s", gt=0.0, le=5.0)
-    wheelbase: float = parameter(0.5, "Distance of the axles (Ackermann).", unit="m", gt=0.0)
+    wheelbase: float = parameter(
+        0.0,
+        "Distance of the axles (Ackermann), for commands with a steering angle; 0 = commands with a yaw rate.",
+        unit="m",
+        ge=0.0,
+    )
     max_steering_angle: float = parameter(0.5, "Steering limit (Ackermann).", unit="rad", gt=0.0, lt=1.5)
     vx_std: float = parameter(0.25, "Standard deviation of the speed samples.", unit="m/s", gt=0.0)
     wz_std: float = parameter(0.5, "Standard deviation of yaw rate (or steering) samples.", gt=0.0)
@@ -70,17 +76,22 @@ class SampledMotions:
     min_turning_radius: float
 
     @property
+    def wheelbase(self) -> float:
+        """Distance of the axles [m] of the car whose angles are sampled: its own, or any; the curves are the same."""
+        return self.parameters.wheelbase or USUAL_WHEELBASE
+
+    @property
     def steering_limit(self) -> float:
         """Largest steering angle [rad]: as configured, and no curve tighter than the robot's."""
         p = self.parameters
         if self.min_turning_radius == 0.0:
             return p.max_steering_angle
-        return min(p.max_steering_angle, math.atan(p.wheelbase / self.min_turning_radius))
+        return min(p.max_steering_angle, math.atan(self.wheelbase / self.min_turning_radius))
 
     @property
     def turning_radius(self) -> float:
         """Radius [m] of a car's tightest curve."""
-        return self.parameters.wheelbase / math.tan(self.steering_limit)
+        return self.wheelbase / math.tan(self.steering_limit)
 
     def sampled(
         self, rng: np.random.Generator, nominal: FloatArray, max_speed: float, remaining: float, *, reverses: bool
@@ -113,14 +124,17 @@ class SampledMotions:
         """Speeds and yaw rates (..., 2) that controls (..., 2) lead to."""
         if self.parameters.motion_model != "ackermann":
             return controls
-        yaw_rates = controls[..., 0] * tan(controls[..., 1]) / self.parameters.wheelbase
+        yaw_rates = controls[..., 0] * tan(controls[..., 1]) / self.wheelbase
         return np.stack([controls[..., 0], yaw_rates], axis=-1)
 
     def command(self, speed: float, turn: float) -> Command:
         """Controls as a command."""
         if self.parameters.motion_model == "differential":
             return Twist.planar(vx=speed, wz=turn)
-        return AckermannCommand(speed, clamp(turn, self.steering_limit))
+        angle = clamp(turn, self.steering_limit)
+        if self.parameters.wheelbase == 0.0:
+            return Twist.planar(vx=speed, wz=speed * math.tan(angle) / self.wheelbase)
+        return AckermannCommand(speed, angle)
 
 
 def pieces_of_a_step(p: MPPIParameters, shortest_edge: float) -> int:

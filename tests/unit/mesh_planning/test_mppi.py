@@ -104,6 +104,22 @@ def test_an_ackermann_robot_gets_steering_and_reaches_the_goal(make_plugin, plai
     assert controller.is_goal_reached(pose, 0.2, math.pi), pose
 
 
+def test_a_car_without_a_wheelbase_is_commanded_curves_that_it_drives_whatever_its_axles(make_plugin, plain):
+    path = Path.from_points([(0.8, 1.0, 0.0), (3.0, 1.2, 0.0), (4.5, 2.5, 0.0), (4.8, 4.8, 0.0)])
+    commands = {}
+    for wheelbase in (0.0, 0.5):
+        controller = make_plugin(MPPIController, plain(), motion_model="ackermann", wheelbase=wheelbase)
+        controller.min_turning_radius = 1.75
+        controller.set_plan(path)
+        commands[wheelbase] = controller.compute_velocity_commands(
+            ControlRequest(Pose.planar(0.8, 1.0), Twist())
+        ).command
+    twist, steered = commands[0.0], commands[0.5]
+    assert twist.vx == steered.speed > 0.0
+    assert twist.wz == pytest.approx(steered.speed * math.tan(steered.steering_angle) / 0.5) != 0.0
+    assert abs(twist.wz) * 1.75 <= twist.vx * (1.0 + 1e-9)
+
+
 @pytest.mark.parametrize("yaw", [1.6, 2.4, 2.8, math.pi])
 def test_a_car_turns_round_onto_a_path_that_begins_behind_it(make_plugin, plain, yaw):
     controller = make_plugin(MPPIController, plain(12.0, 12.0), motion_model="ackermann", wheelbase=0.4)

@@ -104,7 +104,7 @@ def test_a_robot_started_at_any_heading_follows_the_field_over_its_via_point_and
 
 
 def test_a_car_that_may_not_reverse_refuses_a_path_whose_poses_ask_for_it(make_plugin, plain):
-    controller = make_plugin(MPPIController, plain(), motion_model="ackermann")
+    controller = make_plugin(MPPIController, plain(), motion_model="ackermann", wheelbase=0.5)
     assert not controller.set_plan(with_cusps())
     assert controller.set_plan(circles())
 
@@ -125,7 +125,7 @@ def turn_in_three_points(radius=1.0, step=0.05):
 
 @pytest.mark.parametrize("path", [turn_in_three_points(), with_cusps()], ids=["three points", "straight"])
 def test_a_car_drives_cusps_forward_and_back_and_keeps_to_the_robots_curves(make_plugin, plain, drive_car, path):
-    controller = make_plugin(MPPIController, plain(8.0, 6.0), motion_model="ackermann", min_vel_x=-0.5)
+    controller = make_plugin(MPPIController, plain(8.0, 6.0), motion_model="ackermann", wheelbase=0.5, min_vel_x=-0.5)
     controller.min_turning_radius = 0.95
     assert controller.set_plan(path)
     poses, speeds, angles = drive_car(controller, path[0], 60.0)
