@@ -38,14 +38,14 @@ SIDES = {"10k": 100, "100k": 316, "1M": 1000}
 CPP_RATIOS = {"dijkstra": 5.3, "cvp": 18.0, "inflation": 7.5}
 """Time of the C++ original over SciPy's full Dijkstra, median over 10 k to 1 M vertices."""
 LIMITS = {
-    "dijkstra": 0.4,
+    "dijkstra": 0.3,
     "astar": 0.25,
-    "cvp": 1.7,
+    "cvp": 1.3,
     "inflation": 0.8,
     "cvp_potpourri3d": 0.2,
     "shuffled": 1.2,
     "repair": 0.1,
-    "repair_midway": 0.1,
+    "repair_midway": 0.12,
 }
 NEVER = np.zeros(1, dtype=np.uint8)
 

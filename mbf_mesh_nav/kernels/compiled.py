@@ -50,6 +50,16 @@ def inner_kernel(function: KernelFunction) -> KernelFunction:
     return cast(KernelFunction, compile_lazily(function, **OPTIONS, no_cpython_wrapper=True, _nrt=False))
 
 
+def inlined_kernel(function: KernelFunction) -> KernelFunction:
+    """Compile a plain step that is called once, in a hot loop, as part of what calls it.
+
+    Each array takes seven words of the stack with every call.
+    """
+    return cast(
+        KernelFunction, compile_lazily(function, **OPTIONS, no_cpython_wrapper=True, forceinline=True, _nrt=False)
+    )
+
+
 def inner_array_kernel(function: KernelFunction) -> KernelFunction:
     """Compile a step of other kernels that makes or returns arrays."""
     return cast(KernelFunction, compile_lazily(function, **OPTIONS, no_cpython_wrapper=True, _nrt=True))

@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 KERNELS = Path(__file__).resolve().parents[2] / "mbf_mesh_nav" / "kernels"
-PLAIN, WITH_ARRAYS = {"plain_kernel", "inner_kernel"}, {"kernel", "inner_array_kernel"}
+PLAIN, WITH_ARRAYS = {"plain_kernel", "inner_kernel", "inlined_kernel"}, {"kernel", "inner_array_kernel"}
 MAKES_ARRAYS = {"empty", "zeros", "ones", "full", "arange", "array", "copy", "astype", "concatenate", "argsort", "sort"}
 
 

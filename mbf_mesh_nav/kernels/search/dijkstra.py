@@ -17,11 +17,14 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.lowest_bit import BITS, lowest_bit
 from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.near_far import IN_FAR, IN_NEAR, UNQUEUED, after, raise_threshold
 
 CANCEL_POLL_INTERVAL = 4096
 _AHEAD = Index(16)  # places of the near list, after which a vertex's edges will have come from memory
+_FAR_AHEAD = Index(32)  # the same for where its edges stand, and for its neighbours' distances, which are near its own
+_LAST = Index(5)  # of the edges of most vertices, which are six; asking for what lies behind the end does no harm
 _ROUNDING_MARGIN = 1.0 - 1e-6  # keeps the float32 bound below the float32 path cost
 
 
@@ -80,7 +83,7 @@ def propagate_distances(
         False if cancelled. Without a path all target distances stay infinite.
     """
     near = np.empty(len(distances) + 1, dtype=np.int32)
-    far = np.empty(len(distances), dtype=np.int32)
+    far = np.empty(len(distances) + 1, dtype=np.int32)
     state = np.zeros(len(distances), dtype=np.uint8)
     keys = distances if towards is None else np.empty(len(distances), dtype=np.float32)  # valid in the far list
     head, tail, far_count = Index(0), Index(0), Index(0)
@@ -101,32 +104,48 @@ def propagate_distances(
                 return False
             vertex = Index(near[head])
             head = after(head, near)
-            if head + _AHEAD < Index(len(near)):
-                ahead = Index(near[head + _AHEAD])  # anything where nothing has been written yet
-                if ahead < Index(len(distances)):
-                    prefetch(graph.neighbours, Index(graph.offsets[ahead]))
-                    prefetch(graph.weights, Index(graph.offsets[ahead]))
+            if head + _FAR_AHEAD < tail:
+                ahead = Index(near[head + _FAR_AHEAD])
+                prefetch(graph.offsets, ahead)
+                prefetch(distances, ahead)
+                prefetch(predecessors, ahead)
+            if head + _AHEAD < tail:
+                ahead = Index(graph.offsets[near[head + _AHEAD]])
+                prefetch(graph.neighbours, ahead)
+                prefetch(graph.neighbours, ahead + _LAST)
+                prefetch(graph.weights, ahead)
+                prefetch(graph.weights, ahead + _LAST)
             state[vertex] = UNQUEUED
             base = distances[vertex]
-            for slot in range(Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])):
-                neighbour = Index(graph.neighbours[slot])
-                candidate = base + graph.weights[slot]
-                if candidate < distances[neighbour] and not graph.blocked[neighbour]:
-                    distances[neighbour] = key = candidate
-                    predecessors[neighbour] = vertex
-                    if towards is not None:
-                        key = candidate + straight_line_bound(towards[0], neighbour, towards[1])
-                        keys[neighbour] = key
-                    if key < threshold:
-                        if state[neighbour] != IN_NEAR:
-                            state[neighbour] = IN_NEAR
-                            near[tail] = neighbour
-                            tail = after(tail, near)
-                    elif state[neighbour] == UNQUEUED:
-                        state[neighbour] = IN_FAR
-                        far[far_count] = neighbour
-                        far_count += ONE
+            begin, end = Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])
+            while begin < end:
+                # The edges that gain, as bits, without a branch; there is about one at a vertex, and no telling which.
+                chunk, gaining, bit = begin, Index(0), ONE
+                begin = min(begin + BITS, end)
+                for slot in range(chunk, begin):
+                    gains = base + graph.weights[slot] < distances[Index(graph.neighbours[slot])]
+                    gaining |= bit if gains else Index(0)
+                    bit += bit  # a shift by the slot's number would be turned into vectors, too long for six edges
+                while gaining != 0:
+                    slot = chunk + lowest_bit(gaining)
+                    gaining &= gaining - ONE
+                    neighbour = Index(graph.neighbours[slot])
+                    candidate = base + graph.weights[slot]
+                    if candidate < distances[neighbour] and not graph.blocked[neighbour]:
+                        distances[neighbour] = key = candidate
+                        predecessors[neighbour] = vertex
+                        if towards is not None:
+                            key = candidate + straight_line_bound(towards[0], neighbour, towards[1])
+                            keys[neighbour] = key
+                        # To one list or the other, or to none: written behind both, and counted where it belongs.
+                        is_near, listed = key < threshold, state[neighbour]
+                        near[tail], far[far_count] = neighbour, neighbour
+                        tail += Index(is_near & (listed != IN_NEAR))
+                        tail = tail if tail < Index(len(near)) else Index(0)
+                        far_count += Index((not is_near) & (listed == UNQUEUED))
+                        state[neighbour] = IN_NEAR if is_near else IN_FAR
         # 2. No path shorter than the threshold is left to find: do the targets have theirs?
+        head, tail = Index(0), Index(0)
         if far_count == 0 or cancel_flag[0] != 0:
             return bool(cancel_flag[0] == 0)
         for i in range(len(targets)):

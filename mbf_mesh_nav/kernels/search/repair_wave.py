@@ -17,8 +17,11 @@ from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph
 
 _AHEAD: Any = Index(16)  # places of a list, after which a vertex's edges will have come from memory
-_RESET: Any = np.uint8(1)
-_SEED: Any = np.uint8(2)
+_FAR_AHEAD: Any = Index(32)  # the same for where they stand, and for the field at its neighbours, which are near it
+_LAST: Any = Index(5)  # of the edges of most vertices, which are six; asking for what lies behind the end does no harm
+_BESIDE: Any = np.uint8(1)
+_RESET: Any = np.uint8(2)
+_SEED: Any = np.uint8(3)
 
 
 @kernel
@@ -48,31 +51,42 @@ def invalidate_subtrees(
     seeds : (s,) int32
         Reached vertices beside reset ones, and the roots among those.
     """
-    reset = np.empty(len(distances), dtype=np.int32)
+    reset = np.empty(len(distances) + 1, dtype=np.int32)
+    beside = np.empty(len(distances) + 1, dtype=np.int32)
     seeds = np.empty(len(distances), dtype=np.int32)
     state = np.zeros(len(distances), dtype=np.uint8)
-    count, seed_count, reader = Index(0), Index(0), Index(0)
+    count, beside_count, seed_count, reader = Index(0), Index(0), Index(0), Index(0)
     for changed_vertex in changed:
         vertex = Index(changed_vertex)
         if state[vertex] == 0:
             state[vertex] = _RESET
             reset[count] = vertex
             count += ONE
-    # 1. Reset the changed vertices and everything behind them.
+    # 1. Reset the changed vertices and everything behind them, and list what lies beside.
     while reader < count:
         vertex = Index(reset[reader])
         reader += ONE
+        if reader + _FAR_AHEAD < count:
+            ahead = Index(reset[reader + _FAR_AHEAD])
+            prefetch(graph.offsets, ahead)
+            prefetch(distances, ahead)
+            prefetch(predecessors, ahead)
+            prefetch(state, ahead)
         if reader + _AHEAD < count:
             ahead = Index(graph.offsets[reset[reader + _AHEAD]])
             prefetch(graph.neighbours, ahead)
+            prefetch(graph.neighbours, ahead + _LAST)
         distances[vertex] = np.inf
         predecessors[vertex] = -1
         for slot in range(Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])):
-            child = Index(graph.neighbours[slot])
-            if Index(predecessors[child]) == vertex and state[child] == 0:
-                state[child] = _RESET
-                reset[count] = child
-                count += ONE
+            # To one list or the other, or to none, without a branch: written behind both, counted where it belongs.
+            other = Index(graph.neighbours[slot])
+            is_child, before = Index(predecessors[other]) == vertex, state[other]
+            reset[count] = other
+            count += Index(is_child & (before != _RESET))
+            beside[beside_count] = other
+            beside_count += Index((not is_child) & (before == 0))
+            state[other] = _RESET if is_child else max(before, _BESIDE)
     for index in range(len(roots)):
         root = Index(roots[index])
         if state[root] == _RESET and not graph.blocked[root]:
@@ -80,16 +94,10 @@ def invalidate_subtrees(
             state[root] = _SEED
             seeds[seed_count] = root
             seed_count += ONE
-    # 2. The wave starts again from what is intact around them.
-    for index in range(count):
-        vertex = Index(reset[index])
-        if index + _AHEAD < count:
-            ahead = Index(graph.offsets[reset[index + _AHEAD]])
-            prefetch(graph.neighbours, ahead)
-        for slot in range(Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])):
-            other = Index(graph.neighbours[slot])
-            if state[other] == 0 and distances[other] < np.inf:
-                state[other] = _SEED
-                seeds[seed_count] = other
-                seed_count += ONE
+    # 2. The wave starts again from what is intact of that.
+    for index in range(beside_count):
+        other = Index(beside[index])
+        if state[other] == _BESIDE and distances[other] < np.inf:
+            seeds[seed_count] = other
+            seed_count += ONE
     return seeds[:seed_count].copy()

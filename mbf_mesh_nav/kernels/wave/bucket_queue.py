@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inlined_kernel, inner_kernel
 
 Entries = NDArray[np.uint64]
 
@@ -74,7 +74,7 @@ def put(
     return used + ONE, near_size
 
 
-@inner_kernel
+@inlined_kernel
 def next_bucket(
     heads: IntArray, links: IntArray, entries: Entries, near: Entries, bucket: int, inverse_width: np.float32
 ) -> tuple[int, int]:

@@ -27,13 +27,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inlined_kernel, kernel
+from mbf_mesh_nav.kernels.lowest_bit import BITS, lowest_bit
 from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 from mbf_mesh_nav.kernels.wave.bucket_queue import (
-    BUCKET_MASK,
     BUCKETS_PER_STEP,
     EMPTY,
     RING,
@@ -124,14 +125,6 @@ def propagate_wave(
         # 2. The vertex with the least distance is settled; entries from before it was lowered are dropped.
         if near_size == Index(0):
             bucket, near_size = next_bucket(heads, links, entries, near, bucket, inverse_width)
-            # Those of the bucket behind it have their faces come from memory meanwhile.
-            waiting = heads[Index(bucket + 1) & BUCKET_MASK] if is_large else EMPTY
-            while waiting != EMPTY:
-                ahead = Index(vertex_face_offsets[item_of(entries[waiting])])
-                prefetch(corner_ends, ahead)
-                prefetch(corner_weights, ahead)
-                prefetch(corner_weights, ahead + LAST)
-                waiting = links[waiting]
         if near_size == Index(0) or key_of(near[0]) > limit:
             return pops
         vertex, key = item_of(near[0]), key_of(near[0])
@@ -149,61 +142,96 @@ def propagate_wave(
         # 3. Faces around it with one free corner propagate the wave; so do those with an obtuse corner, once more.
         u1, own_bend = key, bends[vertex]
         to_own_bend = distances[own_bend] if own_bend != NO_BEND else _ZERO
-        for record in range(Index(vertex_face_offsets[vertex]), Index(vertex_face_offsets[vertex + ONE])):
-            first, second = Index(corner_ends[record, 0]), Index(corner_ends[record, 1])
-            states = state[first] + state[second]
-            if states != _ONE_FREE and states != _ALL_SETTLED:
-                for side in range(2 if along_edges and states < _ONE_FREE else 0):
-                    end, distance = Index(corner_ends[record, side]), key + corner_weights[record, side]
-                    if state[end] == _FREE and distance < distances[end]:
-                        distances[end], predecessors[end] = distance, vertex
-                        cut_records[end], bends[end] = ALONG_EDGE, vertex
-                        entry = entry_of(distances[end], end)
-                        used, near_size = put(
-                            heads, links, entries, near, used, near_size, bucket, inverse_width, entry
-                        )
-                continue
-            known, free = first, second
-            to_known, to_free, between = corner_weights[record, 0], corner_weights[record, 1], corner_weights[record, 2]
-            if states == _ALL_SETTLED:  # only an obtuse corner can gain now, and that lies opposite to the longest side
-                longer, shorter = max(to_known, to_free), min(to_known, to_free)
-                if not is_obtuse(longer, shorter, between):
+        begin, end = Index(vertex_face_offsets[vertex]), Index(vertex_face_offsets[vertex + ONE])
+        while begin < end:
+            chunk, begin = begin, min(begin + BITS, end)
+            due = _due_faces(corner_ends, corner_weights, state, chunk, begin, along_edges)
+            while due != 0:
+                record = chunk + lowest_bit(due)
+                due &= due - ONE
+                first, second = Index(corner_ends[record, 0]), Index(corner_ends[record, 1])
+                to_first, to_second = corner_weights[record, 0], corner_weights[record, 1]
+                between, states = corner_weights[record, 2], state[first] + state[second]
+                if states < _ONE_FREE:
+                    for side in range(2):
+                        other, distance = Index(corner_ends[record, side]), key + corner_weights[record, side]
+                        if state[other] == _FREE and distance < distances[other]:
+                            distances[other], predecessors[other] = distance, vertex
+                            cut_records[other], bends[other] = ALONG_EDGE, vertex
+                            entry = entry_of(distances[other], other)
+                            used, near_size = put(
+                                heads, links, entries, near, used, near_size, bucket, inverse_width, entry
+                            )
                     continue
-            if state[first] == _FREE or (states == _ALL_SETTLED and to_free > to_known):
-                known, free = second, first
-                to_known, to_free = to_free, to_known
-            u2, bend = distances[known], bends[known]
-            if u2 + to_known < u1 and predecessors[vertex] >= 0:
-                # No face had two known corners to bring the path along this side: the vertex is taken once more.
-                distances[vertex] = u2 + to_known
-                predecessors[vertex], cut_records[vertex], bends[vertex] = known, ALONG_EDGE, known
-                entry = entry_of(distances[vertex], vertex)
-                used, near_size = put(heads, links, entries, near, used, near_size, bucket, inverse_width, entry)
-                pops -= 1
-                break
-            to_bend = to_own_bend if bend == own_bend else _ZERO
-            distance, side = unfolded_distance(u1 - to_bend, u2 - to_bend, to_known, to_free, between)
-            distance += to_bend
-            if not distance < distances[free]:
-                continue
-            last_bend = Count(bend)
-            if side == 0 and (bend != own_bend or distance < near_source or is_obtuse(to_known, to_free, between)):
-                distance, side, last_bend = distance_where_fronts_meet(
-                    vertex_face_offsets, corner_ends, corner_weights, distances, bends, vertex, known, free, to_free,
-                    between, distance,
-                )  # fmt: skip
-            is_seed = states == _ALL_SETTLED and predecessors[free] < 0
-            if is_seed or not distance < distances[free]:
-                continue
-            nearer = vertex if side == 1 or (side == 0 and u1 < u2) else known
-            if distance <= distances[nearer]:  # an obtuse corner close behind its long side
-                distance = np.nextafter(distances[nearer], _INFINITE)
-                if distance >= distances[free]:
+                # An obtuse corner lies opposite to the longest side.
+                is_second = (state[first] == _FREE) | ((states == _ALL_SETTLED) & (to_second > to_first))
+                known, free = (second, first) if is_second else (first, second)
+                to_known, to_free = (to_second, to_first) if is_second else (to_first, to_second)
+                u2, bend = distances[known], bends[known]
+                if u2 + to_known < u1 and predecessors[vertex] >= 0:
+                    # No face had two known corners to bring the path along this side: the vertex is taken once more.
+                    distances[vertex] = u2 + to_known
+                    predecessors[vertex], cut_records[vertex], bends[vertex] = known, ALONG_EDGE, known
+                    entry = entry_of(distances[vertex], vertex)
+                    used, near_size = put(heads, links, entries, near, used, near_size, bucket, inverse_width, entry)
+                    pops -= 1
+                    begin = end
+                    break
+                to_bend = to_own_bend if bend == own_bend else _ZERO
+                distance, side = unfolded_distance(u1 - to_bend, u2 - to_bend, to_known, to_free, between)
+                distance += to_bend
+                if not distance < distances[free]:
                     continue
-            distances[free] = distance
-            bends[free] = last_bend if side == 0 else (vertex if side == 1 else known)
-            predecessors[free] = nearer
-            cut_records[free] = record if side == 0 else ALONG_EDGE
-            if state[free] == _FREE:
-                entry = entry_of(np.float32(distance), free)
-                used, near_size = put(heads, links, entries, near, used, near_size, bucket, inverse_width, entry)
+                last_bend = Count(bend)
+                if side == 0 and (bend != own_bend or distance < near_source or is_obtuse(to_known, to_free, between)):
+                    distance, side, last_bend = distance_where_fronts_meet(
+                        vertex_face_offsets, corner_ends, corner_weights, distances, bends, vertex, known, free,
+                        to_free, between, distance,
+                    )  # fmt: skip
+                is_seed = states == _ALL_SETTLED and predecessors[free] < 0
+                if is_seed or not distance < distances[free]:
+                    continue
+                nearer = vertex if side == 1 or (side == 0 and u1 < u2) else known
+                if distance <= distances[nearer]:  # an obtuse corner close behind its long side
+                    distance = np.nextafter(distances[nearer], _INFINITE)
+                    if distance >= distances[free]:
+                        continue
+                distances[free] = distance
+                bends[free] = last_bend if side == 0 else (vertex if side == 1 else known)
+                predecessors[free] = nearer
+                cut_records[free] = record if side == 0 else ALONG_EDGE
+                if state[free] == _FREE:
+                    if is_large:  # its faces come from memory while it waits
+                        ahead = Index(vertex_face_offsets[free])
+                        prefetch(corner_ends, ahead)
+                        prefetch(corner_ends, ahead + LAST)
+                        prefetch(corner_weights, ahead)
+                        prefetch(corner_weights, ahead + LAST)
+                    entry = entry_of(np.float32(distance), free)
+                    used, near_size = put(heads, links, entries, near, used, near_size, bucket, inverse_width, entry)
+
+
+@inlined_kernel
+def _due_faces(
+    corner_ends: IntArray,
+    corner_weights: Float32Array,
+    state: NDArray[np.uint8],
+    begin: int,
+    end: int,
+    along_edges: bool,
+) -> int:
+    """The records from ``begin`` to before ``end`` through which a wave goes on, as bits.
+
+    Those with one free corner; of those with none the obtuse ones; along edges also those with two. A third of the
+    records are, and there is no telling which, so this is without branches.
+    """
+    due, bit = Index(0), ONE
+    for record in range(begin, end):
+        states = state[Index(corner_ends[record, 0])] + state[Index(corner_ends[record, 1])]
+        to_first, to_second = corner_weights[record, 0], corner_weights[record, 1]
+        longer, shorter = max(to_first, to_second), min(to_first, to_second)
+        gains_again = (states == _ALL_SETTLED) & is_obtuse(longer, shorter, corner_weights[record, 2])
+        is_due = (states == _ONE_FREE) | gains_again | (along_edges & (states < _ONE_FREE))
+        due |= bit if is_due else Index(0)
+        bit += bit  # a shift by the record's number would be turned into vectors, which costs more with six records
+    return due  # type: ignore[no-any-return]

@@ -186,6 +186,23 @@ def test_the_wave_equals_its_slow_twin_on_rough_weighted_ground(seed):
     assert (fast[predecessors[led]] < fast[led]).all()  # predecessors lead to the source, whatever the corners' angles
 
 
+def test_the_wave_goes_on_through_all_faces_of_a_vertex_with_more_than_a_number_has_bits():
+    angles = np.linspace(0.0, 2.0 * np.pi, 150, endpoint=False)
+    rim = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(150)])
+    disc = np.concatenate([[[0.0, 0.0, 0.0]], rim, 1.2 * rim])
+    inner, after = np.arange(1, 151), np.roll(np.arange(1, 151), -1)
+    fan = np.column_stack([np.zeros(150, int), inner, after])
+    ring = np.concatenate(
+        [np.column_stack([inner, inner + 150, after]), np.column_stack([inner + 150, after + 150, after])]
+    )
+    mesh_map = MeshMap.from_arrays(disc, np.concatenate([fan, ring]))
+    for source in np.flatnonzero(np.linalg.norm(mesh_map.vertices, axis=1) > 1.1)[::10]:
+        fast, _, seeds = wave_from_vertex(mesh_map, source)
+        straight = np.linalg.norm(mesh_map.vertices - mesh_map.vertices[source], axis=1)
+        slow = slow_wave(mesh_map, mesh_map.neighbour_lengths, seeds, straight, 0.5)
+        np.testing.assert_allclose(fast, slow, rtol=2e-5)
+
+
 def test_on_a_mesh_larger_than_the_caches_distances_on_a_plane_are_exact():
     mesh_map = MeshMap.from_heights(np.zeros((225, 225)), 0.5, 0.5)
     assert len(mesh_map.vertices) > LARGE

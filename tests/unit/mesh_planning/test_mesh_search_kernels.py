@@ -7,8 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.lowest_bit import _by_halves, lowest_bit
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, frontier, propagate_distances
 from mbf_mesh_nav.kernels.search.indexed_heap import push_or_decrease, remove_top, top_item, top_key
+from mbf_mesh_nav.kernels.search.repair_wave import invalidate_subtrees
 from mbf_mesh_nav.kernels.wave.bucket_queue import (
     EMPTY,
     RING,
@@ -82,6 +84,61 @@ def test_near_far_distances_equal_dijkstra_bit_for_bit(seed, step):
     assert finished
     for vertex in np.flatnonzero(np.isfinite(distances))[1:]:
         assert distances[predecessors[vertex]] < distances[vertex]
+
+
+def test_a_vertex_with_more_edges_than_a_number_has_bits_reaches_all_of_them():
+    rim = np.arange(1, 151, dtype=np.int32)
+    offsets = np.concatenate([[0], np.arange(150, 301)]).astype(np.int32)
+    weights = np.random.default_rng(0).uniform(1.0, 9.0, 150).astype(np.float32)
+    hub = offsets, np.concatenate([rim, np.zeros(150, np.int32)]), np.tile(weights, 2), np.arange(151) % 7 == 3
+    distances, predecessors, _ = run_dijkstra((None, *hub), 0)
+    np.testing.assert_array_equal(distances, heap_dijkstra(*hub, 0))
+    assert (predecessors[1:] == np.where(hub[3], -1, 0)[1:]).all()
+
+
+def test_of_two_edges_to_the_same_vertex_the_cheaper_one_counts_in_either_order():
+    offsets, neighbours = np.array([0, 2, 4], np.int32), np.array([1, 1, 0, 0], np.int32)
+    for weights in ([1.0, 2.0, 1.0, 2.0], [2.0, 1.0, 2.0, 1.0]):
+        graph = None, offsets, neighbours, np.array(weights, np.float32), np.zeros(2, bool)
+        assert run_dijkstra(graph, 0)[0].tolist() == [0.0, 1.0]
+
+
+@kernel
+def first_bit(number):
+    return lowest_bit(number)
+
+
+@given(place=st.integers(0, 63), above=st.integers(0, 2**64 - 1))
+@settings(max_examples=40, deadline=None)
+def test_the_lowest_bit_is_the_first_one_that_is_set(place, above):
+    number = np.uint64(((above << place) | (1 << place)) & (2**64 - 1))
+    assert first_bit(number) == _by_halves(number) == place
+
+
+def slow_invalidation(graph, distances, predecessors, roots, root_distances, changed):
+    """The twin: all descendants one after the other, then in the same order whatever lies beside them."""
+    around = lambda vertex: graph.neighbours[graph.offsets[vertex] : graph.offsets[vertex + 1]].tolist()  # noqa: E731
+    reset = list(dict.fromkeys(changed.tolist()))
+    for vertex in reset:
+        reset += [other for other in around(vertex) if predecessors[other] == vertex and other not in reset]
+    distances[reset], predecessors[reset] = np.inf, -1
+    kept = [k for k, root in enumerate(roots) if root in reset and not graph.blocked[root]]
+    distances[roots[kept]] = root_distances[kept]
+    beside = dict.fromkeys(other for vertex in reset for other in around(vertex) if other not in reset)
+    return [*roots[kept].tolist(), *(other for other in beside if distances[other] < np.inf)]
+
+
+@given(seed=st.integers(0, 10**6), changed=st.lists(st.integers(0, 399), max_size=30))
+@settings(max_examples=40, deadline=None)
+def test_what_lies_behind_a_change_is_reset_and_what_lies_beside_goes_on_from_there(seed, changed):
+    _, *arrays = graph = random_grid_graph(seed, side=20)
+    distances, predecessors, _ = run_dijkstra(graph, 0)
+    ends = np.array([0], np.int32), np.zeros(1, np.float32), np.array(changed, np.int32)
+    slow = distances.copy(), predecessors.copy()
+    seeds = invalidate_subtrees(SearchGraph(*arrays), distances, predecessors, *ends)
+    assert seeds.tolist() == slow_invalidation(SearchGraph(*arrays), *slow, *ends)
+    np.testing.assert_array_equal(distances, slow[0])
+    np.testing.assert_array_equal(predecessors, slow[1])
 
 
 @given(seed=st.integers(0, 10**6), step=st.floats(0.01, 20.0))
