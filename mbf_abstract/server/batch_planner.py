@@ -15,12 +15,12 @@ Example
 
 from __future__ import annotations
 
+import math
 import os
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import count
 
 from mbf_abstract.event_values import error_text
 from mbf_abstract.execution.plan_check import in_global_frame, path_result
@@ -121,16 +121,13 @@ class BatchPlanner:
             self._busy.release()
 
     def _plan(self, pairs: list[Pair], plan: _PairPlan) -> list[GetPathResult]:
-        """Hand the pairs out to the threads, one by one."""
+        """Hand the pairs out to the threads, one by one; far ones first, so that no thread is left with a long one."""
         results: dict[int, GetPathResult] = {}
-        numbers = count()  # its next() is atomic
-
-        def indices() -> Iterator[int]:
-            while (index := next(numbers)) < len(pairs):
-                yield index
+        far_first = sorted(range(len(pairs)), key=lambda index: -math.dist(*(pose.position for pose in pairs[index])))
+        indices = iter(far_first)  # of a list, so its next() is atomic
 
         def work(planner: AbstractPlanner) -> None:
-            for index in indices():
+            for index in indices:
                 results[index] = plan.result(planner, pairs[index])
 
         planners = self._planners[: len(pairs)]

@@ -119,7 +119,7 @@ def propagate_distances(
             base = distances[vertex]
             begin, end = Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])
             while begin < end:
-                # The edges that gain, as bits, without a branch; there is about one at a vertex, and no telling which.
+                # The edges that gain, as bits, without a branch: about one at a vertex does, and nobody knows which.
                 chunk, gaining, bit = begin, Index(0), ONE
                 begin = min(begin + BITS, end)
                 for slot in range(chunk, begin):

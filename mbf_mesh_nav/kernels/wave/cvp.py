@@ -223,7 +223,7 @@ def _due_faces(
     """The records from ``begin`` to before ``end`` through which a wave goes on, as bits.
 
     Those with one free corner; of those with none the obtuse ones; along edges also those with two. A third of the
-    records are, and there is no telling which, so this is without branches.
+    records are, and nobody knows which, so this is without branches.
     """
     due, bit = Index(0), ONE
     for record in range(begin, end):
