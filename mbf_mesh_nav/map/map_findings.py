@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from mbf_abstract.geometry.arithmetic import norm
+from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.files.elevation_files import elevation_readers
 from mbf_mesh_nav.files.file_frames import GLTF_FORMATS, FileFrame, file_frame
 from mbf_mesh_nav.files.map_header import read_map_header
@@ -20,7 +19,6 @@ LETHAL_SHARE = 0.95
 """A map with a greater share of lethal vertices is hardly intended."""
 AXES = ("x", "y", "z")
 STATES_UP = (*sorted(GLTF_FORMATS), ".dae")
-SIDES = ("x", "y", "z", "-x", "-y", "-z")
 FACING = 0.85
 """Cosine of the angle between a normal and an axis below which a face does not look along it."""
 LYING = 1.75
@@ -67,11 +65,9 @@ def lying_findings(mesh_map: MeshMap, file: str, up_axis: str) -> Iterator[Findi
     stated = up_axis or not file or Path(file).suffix.lower() in (*STATES_UP, *elevation_readers())
     if stated or (mesh_map.default_layer is not None and any(True for _ in _lethal(mesh_map))):  # that one says it, too
         return
-    first, second, third = (mesh_map.vertices[mesh_map.faces[:, corner]] for corner in range(3))
-    along = np.hstack([mesh_map.face_normals, -mesh_map.face_normals])  # (F, 6): x, y, z, -x, -y, -z
-    side = np.where(along.max(axis=1) > FACING, along.argmax(axis=1), len(SIDES))
-    areas = np.bincount(side, norm(np.cross(second - first, third - first)), len(SIDES) + 1)
-    looking = (areas[: len(SIDES)] / max(math.fsum(areas.tolist()), 1e-12)).reshape(2, 3).max(axis=0).tolist()
+    areas, normals = _doubled_areas(mesh_map), mesh_map.face_normals
+    along = [(areas[column > FACING].sum(), areas[column < -FACING].sum()) for column in normals.T]
+    looking = (np.max(along, axis=1) / max(float(areas.sum()), 1e-12)).tolist()
     axis = looking.index(max(looking))
     most, beside = looking[axis], max(looking[:axis] + looking[axis + 1 :])
     if axis != 2 and most >= LYING * beside:
@@ -80,6 +76,15 @@ def lying_findings(mesh_map: MeshMap, file: str, up_axis: str) -> Iterator[Findi
             f"{AXES[axis]} is up in the file, set up_axis: {AXES[axis]}"
         )
         yield Finding("lying", text, NOWHERE, harmless=True)
+
+
+def _doubled_areas(mesh_map: MeshMap) -> FloatArray:
+    """Twice the area (F,) [m^2] of each face; by columns, which is four times as fast as ``np.cross`` of rows."""
+    (ux, vx), (uy, vy), (uz, vz) = (
+        (column[:, 1] - column[:, 0], column[:, 2] - column[:, 0])
+        for column in (mesh_map.vertices[:, axis][mesh_map.faces] for axis in range(3))
+    )
+    return np.asarray(np.sqrt((uy * vz - uz * vy) ** 2 + (uz * vx - ux * vz) ** 2 + (ux * vy - uy * vx) ** 2))
 
 
 def _narrow(mesh_map: MeshMap) -> Iterator[Finding]:
