@@ -25,10 +25,13 @@ YAML_SUFFIXES = {".yaml", ".yml"}
 
 
 class StandingRobot:
-    """A robot that never moves; commands to it are a mistake of the caller and have no effect."""
+    """A robot that never moves; commands to it are a mistake of the caller and have no effect.
 
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
+    ``min_turning_radius`` is that of the one it stands in for [m].
+    """
+
+    def __init__(self, clock: Clock, min_turning_radius: float = 0.0) -> None:
+        self._clock, self.min_turning_radius = clock, min_turning_radius
 
     def send_command(self, command: Command) -> None:
         """Stay."""
@@ -39,10 +42,12 @@ class StandingRobot:
 
 
 @contextmanager
-def standing_server(cls: type[AbstractNavigationServer], config: Config) -> Iterator[AbstractNavigationServer]:
+def standing_server(
+    cls: type[AbstractNavigationServer], config: Config, min_turning_radius: float = 0.0
+) -> Iterator[AbstractNavigationServer]:
     """Build a server around a robot that stands at the origin; it is closed at the end."""
     with NavigationSession() as session:
-        server = session.serve(cls, config, StandingRobot(session.clock))
+        server = session.serve(cls, config, StandingRobot(session.clock, min_turning_radius))
         place_robot(server, Pose.planar(0.0, 0.0, frame_id=config.parameters.global_frame))
         yield server
 

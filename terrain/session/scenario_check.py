@@ -28,7 +28,7 @@ from terrain.scenarios.settings import apply_world_settings
 from terrain.scenarios.world import ScenarioWorld
 from terrain.session.navigation_config import write_navigation_config
 from terrain.session.robot_fit import notes_on_fit
-from terrain.urdf_robots.robot_choice import RobotChoice, description_of, notes_on
+from terrain.urdf_robots.robot_choice import RobotChoice, description_of, notes_on, spec_of
 from terrain.worlds.generate import flat_terrain
 from terrain.worlds.map_files import MapFiles
 
@@ -172,7 +172,7 @@ def _check_server(
             str(file): f"{source} (with settings)" if settings else str(source),
             str(folder): str(source.parent),
         }
-        with standing_server(*read_config(file)) as server:
+        with standing_server(*read_config(file), spec_of(robot).min_turning_radius) as server:
             return [*server.notes, *notes_on_fit(server, robot)]
     return []
 

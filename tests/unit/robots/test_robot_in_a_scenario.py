@@ -243,6 +243,15 @@ def test_mbf_check_of_a_scenario_names_what_was_assumed_of_its_robot(scenario):
     assert "max_speed: 1 m/s is assumed" in shown.output
 
 
+def test_mbf_check_names_controllers_that_a_car_cannot_do(scenario, tmp_path):
+    file = scenario("{urdf: 'package://pybullet_data/racecar/racecar.urdf'}")
+    (tmp_path / "nav.yaml").write_text(NAVIGATION.replace("regulated_pure_pursuit", "rotation_shim"))
+    checked = CliRunner().invoke(make_app(), ["check", str(file)])
+    assert checked.exit_code == 0, checked.output
+    told = " ".join(checked.output.split())
+    assert "controller 'pursuit' turns on the spot, which the robot cannot: its tightest curve is" in told
+
+
 def test_mbf_check_lists_mistakes_of_the_urdf_and_of_the_scenario_together(scenario):
     shown = checked(scenario("my.urdf", urdf=robot(BODY, *FOUR_WHEELS, link("body")), goals=[], time_limit=20.0))
     assert shown.exit_code == 2
