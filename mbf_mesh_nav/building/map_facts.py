@@ -10,7 +10,10 @@ from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
 from mbf_mesh_nav.building.decimation import DecimatedMesh
 from mbf_mesh_nav.building.height_errors import root_mean_square
-from mbf_mesh_nav.building.surface import BuiltSurface
+from mbf_mesh_nav.building.surface import POINTS_PER_CELL, BuiltSurface
+
+SPARSE = 0.01
+"""It is told if more than this share of the points lie too far apart for a surface."""
 
 
 @dataclass(frozen=True)
@@ -19,8 +22,8 @@ class MapFacts:
 
     Attributes
     ----------
-    points, outliers, surface_points : int
-        Read; thrown away as isolated; on the surface.
+    points, outliers, sparse_points, surface_points : int
+        Read; thrown away as isolated; so few, with none around, that there is no surface; on the surface.
     unit : float
         Length of the files' unit.
     origin : tuple of float
@@ -50,6 +53,7 @@ class MapFacts:
 
     points: int
     outliers: int
+    sparse_points: int
     surface_points: int
     unit: float
     origin: tuple[float, float, float]
@@ -88,7 +92,8 @@ def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
     square = patches.grid.cell * patches.grid.cell
     distances = np.abs(surface.distances[np.isfinite(surface.distances)].astype(np.float64))
     on_surface = used & ~patches.is_filled
-    counts = (patches.ends - patches.firsts)[on_surface]
+    of_patch = patches.ends - patches.firsts
+    counts, is_bare = of_patch[on_surface], ~(used | surface.is_obstacle | surface.is_small)
     rms = float(np.sqrt((distances * distances).mean())) if len(distances) else 0.0
     points_of_cell = float(np.median(counts)) if len(counts) else 0.0
     _, levels = np.unique(patches.cells[used], return_counts=True)
@@ -96,6 +101,7 @@ def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
     return MapFacts(
         points=len(cloud.points),
         outliers=int(surface.is_outlier.sum()),
+        sparse_points=int(of_patch[is_bare & (of_patch < POINTS_PER_CELL)].sum()),
         surface_points=len(distances),
         unit=cloud.unit,
         origin=cloud.origin,
@@ -127,6 +133,8 @@ def lines_of(facts: MapFacts) -> list[tuple[str, str]]:
     if facts.faces < facts.faces_before:
         mesh += f" of {facts.faces_before}, {facts.decimation_max:.3f} m from the whole surface at most"
     thrown = f"{facts.outliers} isolated points, {facts.small_area:.0f} m² of small surfaces"
+    if facts.sparse_points > SPARSE * facts.points:
+        thrown += f", {facts.sparse_points} points too far apart for a surface, which a larger --cell joins"
     return [
         ("points", f"{facts.points}, {x:.1f} x {y:.1f} x {z:.1f} m, {unit}"),
         ("density", f"{facts.density:.0f} points/m², a vertex every {facts.cell:g} m"),

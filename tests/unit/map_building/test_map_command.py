@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from mbf_abstract.cli import make_app
 from mbf_mesh_nav.building import decimation
 from mbf_mesh_nav.building.map_build import build_map
+from mbf_mesh_nav.building.map_facts import lines_of
 from mbf_mesh_nav.files.map_header import MapHeader, read_map_header
 from mbf_mesh_nav.files.mesh_io import read_mesh
 from mbf_mesh_nav.mesh.mesh_report import MeshError
@@ -70,6 +71,22 @@ def test_the_figures_are_printed(tmp_path, survey):
         "coordinates",
     ]
     assert "taken as metres" in done.stdout
+
+
+def floor_of(x0, x1, spacing):
+    """Points of a level floor, 6 m wide, at a spacing [m]."""
+    x, y = (one.ravel() for one in np.meshgrid(np.arange(x0, x1, spacing), np.arange(0.0, 6.0, spacing)))
+    return np.column_stack([x, y, 0.001 * np.cos(7.0 * x + 3.0 * y)])
+
+
+@pytest.mark.parametrize(("coarse", "is_told"), [(0.5, True), (0.1, False)])
+def test_a_tile_that_is_too_coarse_for_the_cells_of_the_others_is_told(tmp_path, coarse, is_told):
+    fine = write_text(tmp_path / "fine.xyz", floor_of(0.0, 11.0, 0.1))
+    other = write_text(tmp_path / "other.xyz", floor_of(11.0, 20.0, coarse))
+    facts, _, _ = build_map([fine, other], tmp_path / "map.ply")
+    told = dict(lines_of(facts))["left out"]
+    assert ("points too far apart for a surface, which a larger --cell joins" in told) == is_told
+    assert (facts.area > 115.0) != is_told and (facts.sparse_points > 150) == is_told
 
 
 def test_a_plan_on_a_built_bridge_crosses_on_the_deck_and_another_below_it(tmp_path):
