@@ -13,7 +13,7 @@ from mbf_mesh_nav.building.height_errors import root_mean_square
 from mbf_mesh_nav.building.surface import POINTS_PER_CELL, BuiltSurface
 
 SPARSE = 0.01
-"""It is told if more than this share of the points lie too far apart for a surface."""
+"""More than this share of the points too far apart for a surface is worth a word."""
 
 
 @dataclass(frozen=True)
