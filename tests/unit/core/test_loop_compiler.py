@@ -1,4 +1,4 @@
-"""The compiler of loops over numbers: numba's own less four steps, and the same machine code (decision 0089)."""
+"""The compiler of loops over numbers: numba's own less five steps, and the same machine code (decisions 0089, 0095)."""
 
 import re
 
@@ -46,4 +46,5 @@ def test_results_and_code_are_those_of_numbas_compiler_with_fewer_steps():
         "generic_rewrites",
         "inline_overloads",
         "nopython_rewrites",
+        "annotate_types",
     }

@@ -1,0 +1,88 @@
+"""Code of kernels, optimised once, and of their steps: none of the processor's, for each caller holds it in its own.
+
+When to use: as a step of ``passes.LoopCompiler``. When not: for functions whose compilation has to be numba's own.
+
+numba makes machine code of every function when it has compiled it, and that of its callers from the intermediate code
+of both. Of a step without a wrapper for Python the first is never run. What it would leave undone is what numba does
+when it takes kernels from its disk: to tell the caller's code the environments (the objects of Python that a function
+refers to) of the steps in it (decision 0095).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary, RuntimeLinker
+from numba.core.compiler_machinery import register_pass
+from numba.core.environment import lookup_environment
+from numba.core.typed_passes import NativeLowering
+
+_ENVIRONMENT = "_ZN08NumbaEnv"
+"""How the variables begin that hold the address of an environment, as in numba's own ``CompileResult``."""
+
+
+class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Code of a kernel with all steps that it calls."""
+
+    counts_holders = True
+    """Whether it counts who holds its arrays."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Optimise each function before the whole module, where that finds what need not be counted.
+
+        Elsewhere it is done twice: the steps are among those for the whole module.
+        """
+        if self.counts_holders:
+            super()._optimize_functions(ll_module)
+        else:
+            ll_module.data_layout = self._codegen._data_layout
+
+    def _finalize_specific(self) -> None:
+        super()._finalize_specific()
+        for variable in self._final_module.global_variables:
+            name = variable.name
+            if name.startswith(_ENVIRONMENT) and (environment := lookup_environment(name)) is not None:
+                self._codegen.set_env(name, environment)
+
+
+class _NoMachineCode:
+    """What numba asks to tell machine code its environment, where there is no machine code."""
+
+    def set_env(self, _name: str, _environment: object) -> None:
+        """Nothing to do: the callers' code is told."""
+
+
+class StepLibrary(KernelLibrary):
+    """Code of a step, to be linked into that of kernels; it is not run by itself."""
+
+    codegen = _NoMachineCode()
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        if any(variable.name.startswith(RuntimeLinker.PREFIX) for variable in self._final_module.global_variables):
+            raise NotImplementedError(f"{self.name} calls itself by way of another step: give it a wrapper for Python")
+        self._finalized = True
+
+    def get_pointer_to_function(self, _name: str) -> int:
+        """Address of a function: 0, there is no wrapper for Python."""
+        self._ensure_finalized()
+        return 0
+
+    def serialize_using_object_code(self) -> tuple[str, str, bytes]:
+        """What is kept on disk."""
+        self._ensure_finalized()
+        return self.name, "bitcode", self._final_module.as_bitcode()
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelLowering(NativeLowering):  # type: ignore[misc]
+    """numba's step from its own code to the processor's, which steps of other kernels leave half-way."""
+
+    def run_pass(self, state: Any) -> bool:
+        """Make the code of a function."""
+        kind = StepLibrary if state.flags.no_cpython_wrapper else KernelLibrary
+        state.library = kind(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.counts_holders = state.flags.nrt
+        state.library.enable_object_caching()
+        return bool(super().run_pass(state))
