@@ -4,7 +4,7 @@ When to use: as a step of ``passes.LoopCompiler``. When not: for functions whose
 
 numba makes machine code of every function when it has compiled it, and that of its callers from the intermediate code
 of both. Of a step without a wrapper for Python the first is never run. What it would leave undone is what numba does
-when it takes kernels from its disk: to tell the caller's code the environments (the objects of Python that a function
+when it takes kernels from its disk: to give the caller's code the environments (the objects of Python that a function
 refers to) of the steps in it (decision 0095).
 """
 
@@ -46,10 +46,10 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 class _NoMachineCode:
-    """What numba asks to tell machine code its environment, where there is no machine code."""
+    """Takes the place of what gives machine code its environment, where there is no machine code."""
 
     def set_env(self, _name: str, _environment: object) -> None:
-        """Nothing to do: the callers' code is told."""
+        """Nothing to do: the callers' code gets it."""
 
 
 class StepLibrary(KernelLibrary):
