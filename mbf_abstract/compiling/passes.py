@@ -5,22 +5,23 @@ comprehensions, with expressions of several whole arrays, which would not become
 
 numba's manual describes how to give a function a compiler of one's own ("Customizing the compiler"). What is left out
 or replaced is named here; all else, what a later numba adds too, is done as in numba's own compiler (decisions 0089
-and 0095).
+and 0095). Nothing is replaced in a numba that is newer than those it was tried with: there a start is slower.
 """
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
+import numba
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager
-
-from mbf_abstract.compiling.known_types import KnownTypeInference
-from mbf_abstract.compiling.step_library import KernelLowering
 
 LEFT_OUT = {"InlineClosureLikes", "GenericRewrites", "InlineOverloads", "NopythonRewrites", "AnnotateTypes"}
 """Steps that look for something in every function and find nothing in a loop over numbers, and the listing of the
 source with its types, for ``inspect_types``."""
-REPLACED = {"NopythonTypeInference": KnownTypeInference, "NativeLowering": KernelLowering}
-"""Steps that do the same with less work."""
+LAST_NUMBA = (0, 68)
+"""The last numba of which the steps that are replaced are known: they are its own affair, and may change."""
 
 
 class LoopCompiler(CompilerBase):  # type: ignore[misc]
@@ -30,6 +31,16 @@ class LoopCompiler(CompilerBase):  # type: ignore[misc]
         """The steps of a compilation."""
         manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
         kept = [entry for entry in manager.passes if entry[0].__name__ not in LEFT_OUT]
-        manager.passes = [(REPLACED.get(step.__name__, step), reason) for step, reason in kept]
+        replaced = replaced_steps() if numba.version_info.short <= LAST_NUMBA else {}
+        manager.passes = [(replaced.get(step.__name__, step), reason) for step, reason in kept]
         manager.finalize()
         return [manager]
+
+
+@cache
+def replaced_steps() -> dict[str, Any]:
+    """Steps of numba by their names, and those that do the same with less work."""
+    from mbf_abstract.compiling.known_types import KnownTypeInference
+    from mbf_abstract.compiling.step_library import KernelLowering
+
+    return {"NopythonTypeInference": KnownTypeInference, "NativeLowering": KernelLowering}

@@ -6,6 +6,7 @@ import numba
 import numpy as np
 from numba.core import event
 
+from mbf_abstract.compiling import passes
 from mbf_abstract.compiling.passes import LoopCompiler
 
 
@@ -48,3 +49,13 @@ def test_results_and_code_are_those_of_numbas_compiler_with_fewer_steps():
         "nopython_rewrites",
         "annotate_types",
     }
+
+
+def test_a_numba_that_nobody_has_tried_compiles_by_its_own_steps(monkeypatch):
+    _, tried = compiled(pipeline_class=LoopCompiler)
+    monkeypatch.setattr(passes, "LAST_NUMBA", (0, 1))
+    kernel, untried = compiled(pipeline_class=LoopCompiler)
+
+    ours, numbas = {"known_type_inference", "kernel_lowering"}, {"nopython_type_inference", "native_lowering"}
+    assert kernel(np.ones((3, 2)), np.zeros(3)) == 3
+    assert untried == (tried - ours) | numbas, (tried, untried)
