@@ -88,14 +88,16 @@ def end_with_the_parent(parent: int) -> None:
     """Let a worker end soon after its parent was killed; it would wait for work without end.
 
     It also ends at once on a signal, so that its job is given to another one: what a navigation server would do
-    first, stop its robot, is of no use to a simulated one.
+    first, stop its robot, is of no use to a simulated one. A worker that outlived a Ctrl-C would wait for work while
+    its parent, interrupted once more, waits for it.
     """
 
     def check(number: int, frame: FrameType | None) -> None:
         if os.getppid() != parent:
             os._exit(1)
 
-    signal.signal(signal.SIGTERM, lambda number, frame: os._exit(128 + number))
+    for ending in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(ending, lambda number, frame: os._exit(128 + number))
     if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, check)
         signal.setitimer(signal.ITIMER_REAL, PARENT_CHECK, PARENT_CHECK)

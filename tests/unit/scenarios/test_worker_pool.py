@@ -9,20 +9,23 @@ from mbf_abstract.testing.scripted_session import ScriptedSession
 from terrain.sweeps.worker_pool import run_in_workers
 
 
-def end_once(marker):
-    """End this worker by SIGTERM in its first job, with a navigation server alive; return the process of the second."""
+def end_once(job):
+    """End this worker by a signal in its first job, with a server alive; return the process of the second."""
+    marker, ending = job
     with ScriptedSession():
         if not os.path.exists(marker):
             with open(marker, "w") as file:
                 file.write(str(os.getpid()))
-            os.kill(os.getpid(), signal.SIGTERM)
+            os.kill(os.getpid(), ending)
         return os.getpid()
 
 
-def test_a_job_whose_worker_is_terminated_is_given_to_another(tmp_path):
+@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
+def test_a_job_whose_worker_is_ended_is_given_to_another(tmp_path, ending):
+    """A worker that outlived a Ctrl-C would wait for work while its parent, interrupted once more, waits for it."""
     marker = tmp_path / "first"
-    ((job, process),) = run_in_workers(end_once, [str(marker)], 1)
-    assert job == str(marker)
+    ((job, process),) = run_in_workers(end_once, [(str(marker), ending)], 1)
+    assert job == (str(marker), ending)
     assert process != int(marker.read_text())
 
 
