@@ -6,7 +6,8 @@ the surface, never across a gap or to another storey. It crosses lethal surface 
 without knowing the obstacle: order it after ``clear`` and ``back_up``. Where an obstacle appears on the escape path
 while it drives, or the end of the path is no longer safe, it searches for another path and stops if there is none.
 A robot that cannot turn on the spot, as a car, or must not, as on a steep slope, drives the shortest manoeuvre out
-instead: forward and backward, in curves it can drive. Its centre crosses what the path might.
+instead: forward and backward, in curves it can drive. Its centre crosses what the path might. On a slope where no such
+manoeuvre leads out a robot that can turn on the spot takes the path after all.
 """
 
 from __future__ import annotations
@@ -102,8 +103,16 @@ class EscapeRecovery(MeshRecovery, ManoeuvreRecovery):
         own_patch = self._patch_below(spot, snapshot, flag)
         steep = slope_at(mesh_map.topology, spot) > mesh_map.max_turning_slope
         if radius := self.min_turning_radius or steep * LEAST_RADIUS:
-            return self._leave_in_curves(own_patch, radius, request)
-        path = self._escape_path(spot, own_patch, request)
+            result = self._leave_in_curves(own_patch, radius, request)
+            if self.min_turning_radius > 0.0 or result.outcome != RecoveryOutcome.IMPASSABLE:
+                return result
+        return self._leave_along_surface(own_patch, request)
+
+    def _leave_along_surface(self, own_patch: BoolArray, request: RecoveryRequest) -> RecoveryResult:
+        """Drive along the shortest path over the mesh, with turns on the spot where it bends."""
+        p, mesh_map = self.parameters, self.mesh_map
+        spot = mesh_map.locate_one(request.motion.pose().position, SURFACE_DISTANCE)
+        path = None if spot is None else self._escape_path(spot, own_patch, request)
 
         def velocity(pose: Pose) -> Twist | RecoveryResult:
             nonlocal path

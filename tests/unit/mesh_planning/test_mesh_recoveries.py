@@ -277,5 +277,17 @@ def test_a_car_escapes_in_curves_it_can_drive_and_a_robot_on_a_steep_slope_does_
     result, motion = run(EscapeRecovery, mesh_map, (3.4, 3.0, 0.0), (0, 1, 0), max_distance=0.2)
     assert (result.outcome, result.message) == (
         RecoveryOutcome.IMPASSABLE,
-        "no safe surface within 0.2 m by a manoeuvre",
+        "no safe surface within 0.2 m along the surface",
     )
+
+
+def test_where_no_curve_leads_off_a_steep_slope_a_robot_that_can_turn_takes_the_path(run, plain, paint):
+    def narrow(v):
+        return np.where(v[:, 0] > 2.45, 0.0, np.where(np.abs(v[:, 1] - 3.0) < 0.11, 0.95, np.inf))
+
+    mesh_map = paint(plain(spacing=0.1), narrow)
+    mesh_map.max_turning_slope = -1.0
+    car, _ = run(CarEscape, mesh_map, (1.6, 3.0, 0.0), (0, 1, 0))
+    assert car.outcome == RecoveryOutcome.IMPASSABLE and "by a manoeuvre" in car.message
+    result, motion = run(EscapeRecovery, mesh_map, (1.6, 3.0, 0.0), (0, 1, 0))
+    assert result.success and motion.current.x > 2.4, result.message
