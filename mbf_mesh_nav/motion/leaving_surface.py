@@ -1,7 +1,7 @@
 """What a manoeuvre out of forbidden surface may cross, and how far it is to where the robot may stand.
 
-When to use: in ``mesh.escape`` for a robot that cannot turn on the spot. When not: others; they turn to the path over
-the vertices, which is shorter and found faster.
+When to use: in ``mesh.escape`` for a robot that cannot turn on the spot, or must not on a steep slope. When not:
+others; they turn to the path over the vertices, which is shorter and found faster.
 """
 
 from __future__ import annotations
