@@ -19,6 +19,7 @@ from mbf_mesh_nav.building.clouds.las_points import read_las_points
 from mbf_mesh_nav.building.clouds.map_projections import contradicts
 from mbf_mesh_nav.building.clouds.mesh_points import MESH_ENDINGS, read_mesh_points
 from mbf_mesh_nav.building.clouds.octomap_points import read_octomap_points
+from mbf_mesh_nav.building.clouds.overlapping_files import disagreements
 from mbf_mesh_nav.building.clouds.pcd_points import read_pcd_points
 from mbf_mesh_nav.building.clouds.plausible_units import refuse_lost_digits, refuse_mixed_units, refuse_units
 from mbf_mesh_nav.building.clouds.ply_points import has_faces, read_ply_points
@@ -130,6 +131,7 @@ def read_clouds(
     origin = _origin(parts)
     for part in parts:
         part -= origin
+    notes += disagreements(files, parts)
     cloud = parts[0] if len(parts) == 1 else np.concatenate(parts)
     x, y, z = origin.tolist()
     return PointCloud(cloud, (x, y, z), stated[files[0]] or 1.0, tuple(notes), system or next(iter(systems), ""))
