@@ -38,6 +38,7 @@ from mbf_costmap_nav.grid.costmap import FREE, LETHAL, MAX_CELLS, UNKNOWN, Costm
 from mbf_costmap_nav.grid.rotated_map import axis_aligned_shape, rotated_to_axes
 
 IMAGE_SUFFIXES = {".pgm", ".png", ".bmp"}
+DESCRIPTION_SUFFIXES = {".yaml", ".yml"}
 BARE_IMAGE_RESOLUTION = 0.05  # m, what most map makers use
 IMAGE_FORMATS = ("PPM", "PNG", "BMP")
 """Formats that Pillow may try; for some of its other formats it starts external programs."""
@@ -132,6 +133,9 @@ def load_map(file: Path | str, max_cells: int = MAX_CELLS, *, confined: bool = F
         if not file.with_suffix(".yaml").is_file():
             return load_image(file, BARE_IMAGE_RESOLUTION, max_cells=max_cells)
         file = file.with_suffix(".yaml")
+    elif file.suffix.lower() not in DESCRIPTION_SUFFIXES:
+        known = ", ".join(sorted(DESCRIPTION_SUFFIXES | IMAGE_SUFFIXES))
+        raise MapError(file, f"expected a map of map_server or an image ({known}), got '{file.suffix}'")
     description = read_description(file)
     image = file.parent / description.image
     if confined and not _lies_in(image, file.parent):

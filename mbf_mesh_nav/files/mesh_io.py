@@ -59,7 +59,8 @@ def read_mesh(
     path = Path(file)
     ending = path.suffix.lower()
     if ending not in (known := known_endings()):
-        raise MeshError(str(path), [f"unknown ending '{ending}'; known: {', '.join(sorted(known))}"])
+        reason = f"unknown ending '{ending}'; known: {', '.join(sorted(known))}"
+        raise MeshError(str(path), [reason], "Of a point cloud, mbf map build makes a mesh")
     require_packages(path, ending)
     if not path.is_file():
         raise MeshError(str(path), ["there is no such file"])

@@ -82,6 +82,12 @@ def test_f059_a_description_of_a_missing_image_is_refused(shared_data: Path, nam
         load_map(shared_data / "maps" / name)
 
 
+@pytest.mark.parametrize("name", ["mesh.ply", "folder", "map.yaml.bak"])
+def test_what_is_neither_a_description_nor_an_image_is_refused_unread(tmp_path: Path, name):
+    with pytest.raises(MapError, match=rf"{name}: expected a map of map_server or an image .*, got"):
+        load_map(tmp_path / name)
+
+
 @pytest.mark.parametrize("image_format", ["pgm", "png", "bmp"])
 @pytest.mark.parametrize("mode", list(MapMode), ids=lambda mode: mode.value)
 def test_f060_a_saved_map_loads_as_it_was(tmp_path, image_format, mode):
