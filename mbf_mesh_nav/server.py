@@ -27,11 +27,11 @@ from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.server.plugin_host import ServerError
 from mbf_mesh_nav.files.mesh_io import known_endings, read_mesh, require_packages
+from mbf_mesh_nav.map.ground import ground_heights
 from mbf_mesh_nav.map.map_builder import build_mesh_map
 from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.robot_outline import changes_of_radius
-from mbf_mesh_nav.mesh.ground import ground_heights
 from mbf_mesh_nav.mesh.mesh_report import SHOWN_INDICES
 from mbf_mesh_nav.motion.vector_field import VectorField
 from mbf_mesh_nav.plugins import MeshContext

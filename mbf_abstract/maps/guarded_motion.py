@@ -12,7 +12,7 @@ no velocity but a result           with that
 canceled                           CANCELED, the reason
 time over                          PAT_EXCEEDED
 something ahead would be touched   IMPASSABLE, the place
-somebody would be at any speed     IMPASSABLE, whom
+somebody would be at any speed     it waits within its time; IMPASSABLE, whom for, after the map's ``max_wait``
 the gate refuses a command         STOPPED
 no fresh pose or velocity          TF_ERROR
 the map is stale                   it waits, and goes on when the map is fresh again within its time
@@ -25,14 +25,14 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable
+from typing import ClassVar
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.maps.layers.obeyed_limits import slow_motion
 from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.navigation_map import NavigationMap
-from mbf_abstract.maps.tracking.contact_guard import slower
+from mbf_abstract.maps.tracking.motion_guard import MotionGuard
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractRecovery, RecoveryRequest, RecoveryResult
@@ -53,6 +53,8 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
     """Base of the recoveries that move the robot: write ``recover`` and use ``drive``."""
 
     parameters: GuardedMotionParameters
+    may_go_deeper: ClassVar[bool] = False
+    """Whether it may lie deeper in what it touches than it did."""
 
     @abstractmethod
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
@@ -75,6 +77,10 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
         """All maps of the server: speed limits may stand on any."""
         return self.maps.values() or [self.navigation_map]
 
+    def _guard(self, obstacle_ahead: Callable[[Pose, Twist], str]) -> MotionGuard:
+        within = 0.0 if self.may_go_deeper else self.parameters.check_ahead_time
+        return MotionGuard(self.navigation_map, self._maps(), self.transforms, obstacle_ahead, within)
+
     def drive(
         self,
         request: RecoveryRequest,
@@ -89,27 +95,28 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
         While the map is stale the robot stands and ``velocity`` is not called. One refused command does not end the
         motion, as the goal may be paused and the sleep lasts until it is resumed; two refusals in a row do.
         """
-        obstacle_ahead = obstacle_ahead or self.obstacle_ahead
+        guard = self._guard(obstacle_ahead or self.obstacle_ahead)
         motion, token, limit = request.motion, request.cancel_token, self.parameters.time_limit
-        deadline, refusals, last = self.clock.now() + limit, 0, Twist()
+        deadline, refusals, last, waits_for = self.clock.now() + limit, 0, Twist(), ""
         while not token.cancelled:
             pose = motion.pose()
             if finished(pose):
                 return RecoveryResult(RecoveryOutcome.SUCCESS)
             stale = self.navigation_map.stale_reason(self.clock.now())
             if self.clock.now() >= deadline:
-                text = f"not done after {limit:g} s{f': {stale}' if stale else ''}"
+                why = stale or waits_for
+                text = f"not done after {limit:g} s{f': {why}' if why else ''}"
                 return RecoveryResult(RecoveryOutcome.PAT_EXCEEDED, text)
             answer = Twist() if stale else velocity(pose)
             if isinstance(answer, RecoveryResult):
                 return answer
-            answer, forbidden = slow_motion(self._maps(), self.transforms, pose, answer)
-            here, measured = self.on_map(pose), motion.velocity()
+            measured = motion.velocity()
             moving = last if measured == Twist() else measured  # a robot without odometry measures none
-            share, reason, _ = self.navigation_map.safe_share(here, moving, answer, self.clock.now())
-            if obstacle := forbidden or (reason if share == 0.0 else obstacle_ahead(pose, answer)):
-                return RecoveryResult(RecoveryOutcome.IMPASSABLE, obstacle)
-            refusals, last = 0 if motion.send(slower(answer, share)) else refusals + 1, answer
+            judged = guard.judge(pose, self.on_map(pose), moving, answer, self.clock.now())
+            if judged.obstacle:
+                return RecoveryResult(RecoveryOutcome.IMPASSABLE, judged.obstacle)
+            waits_for = judged.waits_for
+            refusals, last = 0 if motion.send(judged.command) else refusals + 1, Twist() if waits_for else judged.asked
             if refusals > 1 and not token.cancelled:
                 return RecoveryResult(RecoveryOutcome.STOPPED, GATE_REFUSED)
             if not motion.sleep(self.parameters.control_period):

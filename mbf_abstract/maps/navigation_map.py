@@ -153,17 +153,19 @@ class NavigationMap(ABC):
     def obstacle_on_path(self, pose: Pose, command: Twist, duration: float) -> str:
         """As ``obstacle_ahead``, for a robot that follows a path which stays on the map.
 
-        It asks for no more than planners do: beside a free end of the map they let an outline reach over it, and where
-        a map knows no outline only the robot's centre has to keep off ground that costs too much.
+        It asks for no more than planners do: an outline may reach over a free end of the map, and where a map knows no
+        outline only the robot's centre has to keep off ground that costs too much.
         """
         return self.obstacle_ahead(pose, command, duration)
 
     @abstractmethod
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
-        """Offset [m] from ``pose`` to the nearest obstacle, along the axes of the map; None if none is ``within`` [m].
+        """Offset [m] to the nearest obstacle of the storey, along the map's axes; None if none is ``within`` [m]."""
 
-        Obstacles on other storeys do not count.
-        """
+    def contact_depth(self, pose: Pose) -> float:
+        """How deep [m], to half a cell or edge, the robot lies in what it touches at ``pose``; 0 = touches nothing."""
+        offset = self.nearest_obstacle(pose, self.inscribed_radius)
+        return 0.0 if offset is None else max(self.inscribed_radius - math.hypot(*offset), 0.0)
 
     def avoid(self, places: Sequence[AvoidedPlace]) -> None:  # noqa: B027 - for maps that can close places
         """Close discs on the ground, and no others: lethal for plans, refiners and controllers from now on.
@@ -193,12 +195,8 @@ class NavigationMap(ABC):
 
         Parameters
         ----------
-        pose, velocity : Pose, Twist
-            Of the robot.
-        command : Twist
-            What it is about to follow.
-        now : float
-            [s]
+        pose, velocity, command, now : Pose, Twist, Twist, float
+            Of the robot, what it is about to follow, and the time [s].
 
         Returns
         -------

@@ -6,6 +6,8 @@ When to use: where the robot stands in a contact. When not: a robot that touches
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose
@@ -35,6 +37,20 @@ def first_refused(costmap: Costmap, check: FootprintCheck, pose: Pose, poses: Fl
         hit = check.first_collision(costmap, poses[leaves:])
         return leaves + hit if hit >= 0 else -1
     return -1 if deepest[1:].min(initial=np.inf) < deepest[0] - ROUNDING else 0
+
+
+def contact_depth(costmap: Costmap, footprint: Footprint, pose: Pose) -> float:
+    """How deep [m] a footprint lies in lethal cells at a pose; 0 where ``FootprintCheck`` says it touches none."""
+    if not check_of(footprint, costmap.resolution).collides(costmap, pose.x, pose.y, pose.yaw):
+        return 0.0
+    _, deepest = first_deeper_pose(costmap, footprint, pose, np.zeros((0, 3)))
+    return costmap.resolution * max(float(deepest[0]) + 0.5, ROUNDING)
+
+
+@lru_cache(maxsize=8)
+def check_of(footprint: Footprint, resolution: float) -> FootprintCheck:
+    """The check of a footprint on cells of a size [m], kept for the next question."""
+    return FootprintCheck(footprint, resolution)
 
 
 def first_deeper_pose(

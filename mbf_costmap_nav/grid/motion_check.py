@@ -12,17 +12,15 @@ that a planner has returned could be refused.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.failures import obstacle_text
-from mbf_costmap_nav.grid.contact import first_deeper_pose, on_cells
+from mbf_costmap_nav.grid.contact import check_of, first_deeper_pose, on_cells
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.kernels.map.footprint_cost import OUTSIDE
 from mbf_costmap_nav.kernels.map.rasterisation import blocked_under
 
@@ -58,7 +56,7 @@ def obstacle_ahead(
         return blocked_cells(costmap, footprint, x, y, yaw, counts_border=not may_overhang)
 
     collision = (LETHAL,) if may_overhang else (LETHAL, OUTSIDE)
-    check = _check(footprint, costmap.resolution)
+    check = check_of(footprint, costmap.resolution)
     allowed, _ = blocked_at(pose.x, pose.y, pose.yaw)
     touches = allowed > 0 and not leaves_collisions
     on_map = costmap.contains(pose.x, pose.y)
@@ -89,11 +87,6 @@ def _stays_inside(costmap: Costmap, footprint: Footprint, poses: FloatArray) -> 
     reach = footprint.circumscribed_radius + costmap.resolution
     low, high = poses[:, :2].min(axis=0) - reach, poses[:, :2].max(axis=0) + reach
     return len(footprint.vertices) > 2 and costmap.contains(*low.tolist()) and costmap.contains(*high.tolist())
-
-
-@lru_cache(maxsize=8)
-def _check(footprint: Footprint, resolution: float) -> FootprintCheck:
-    return FootprintCheck(footprint, resolution)
 
 
 def blocked_cells(

@@ -16,6 +16,7 @@ from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
 from mbf_abstract.maps.tracking.contact import RobotBox
+from mbf_costmap_nav.grid.contact import contact_depth
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.motion_check import blocked_cells, nearest_lethal, obstacle_ahead
@@ -112,6 +113,10 @@ class SnapshotAnswers(LayeredMap):
             if blocked < covered:  # where all of it lies on obstacles only ``escape`` may move
                 return ""
         return obstacle_ahead(costmap, self.footprint, pose, command, duration, may_overhang=may_overhang)
+
+    def contact_depth(self, pose: Pose) -> float:
+        """How deep [m] the outline lies in lethal cells, see ``grid.contact``; 0 where it touches none."""
+        return contact_depth(self.snapshot(), self.footprint, pose)
 
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
         """Offset [m] to the centre of the nearest lethal cell; None if none is ``within`` [m]."""

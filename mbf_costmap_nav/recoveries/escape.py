@@ -54,6 +54,7 @@ class EscapeRecovery(CostmapRecovery, ManoeuvreRecovery):
 
     Parameters: ClassVar[type[PluginParameters]] = EscapeParameters
     parameters: EscapeParameters
+    may_go_deeper = True
 
     @property
     def manoeuvre_speed(self) -> float:

@@ -21,6 +21,7 @@ from mbf_mesh_nav.map.places import SURFACE_DISTANCE as OF_PLACES
 from mbf_mesh_nav.map.robot_outline import OutlinedMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.borders import beyond_border
+from mbf_mesh_nav.mesh.contact import contact_depth
 from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
 from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE, forbidden_ahead, nearest_of
 from mbf_mesh_nav.mesh.topology import MeshTopology
@@ -172,6 +173,18 @@ class SnapshotAnswers(OutlinedMap):
                 return swept
         locator = self.locator if may_overhang else None
         return forbidden_ahead(self.topology, ranks, place, pose, command, duration, self.disc_reach, locator)
+
+    def contact_depth(self, pose: Pose) -> float:
+        """How deep [m] the robot's disc lies in lethal ground, see ``mesh.contact``; 0 where its centre may stand."""
+        place = self.locate_one(pose.position, SURFACE_DISTANCE)
+        if place is None:
+            return 0.0
+        corners = self.faces[place.face]
+        snapshot = self.snapshot()
+        if not snapshot.traversability_rank(FORBIDDEN_COST, corners).any():
+            return 0.0
+        ranks = snapshot.traversability_rank(FORBIDDEN_COST)
+        return contact_depth(self.topology, ranks, place, self.disc_reach)
 
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
         """Offset [m] to the nearest lethal vertex of the robot's storey; None if none is ``within`` [m]."""

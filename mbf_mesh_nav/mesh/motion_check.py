@@ -2,7 +2,8 @@
 
 The robot's centre is walked over the surface along the arc of its command, and on by its radius in the direction it
 then has. Forbidden surface ends the motion, and so does a border; a robot that stands on forbidden
-surface may leave it, see ``kernels.search.forbidden_surface``. A robot that follows a path is asked for less, see
+surface may leave it, see ``kernels.search.forbidden_surface``, and one in a contact gets no deeper, see ``contact``.
+A robot that follows a path is asked for less, see
 ``forbidden_ahead``. What its sides would touch is in the costs: on a map
 that is not inflated only what lies straight ahead counts. What turns on the spot is checked in ``turning``, too.
 """
@@ -20,6 +21,7 @@ from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned, walk
 from mbf_mesh_nav.kernels.mesh.vectors import Vector
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter, rank_at
 from mbf_mesh_nav.mesh.borders import on_surface
+from mbf_mesh_nav.mesh.contact import Contact
 from mbf_mesh_nav.mesh.locate import SurfaceLocator, SurfacePoint
 from mbf_mesh_nav.mesh.positions import position_text, vector_of
 from mbf_mesh_nav.mesh.topology import MeshTopology
@@ -60,6 +62,7 @@ def forbidden_ahead(
     """
     face, point = place.face, vector_of(place.point)
     stands_on = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
+    contact = Contact.at(mesh, ranks, place, radius, command.speed * duration) if stands_on > 0.0 else None
     if command.speed == 0.0:
         blocked = command.wz != 0.0 and stands_on >= LETHAL_RANK
         return f"the robot stands on an obstacle at {position_text(point)}" if blocked else ""
@@ -78,9 +81,13 @@ def forbidden_ahead(
         if ends and surface is None:
             return f"the surface ends at {position_text(point)}"
         comes_to = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
-        is_ahead = surface is not None and walked >= on_arc
-        reaches_over = is_ahead and not _touches_lethal(mesh, ranks, face, point, centre, radius)
-        if not (may_enter(stands_on, comes_to) or reaches_over):
+        if contact is None:
+            is_ahead = surface is not None and walked >= on_arc
+            reaches_over = is_ahead and not _touches_lethal(mesh, ranks, face, point, centre, radius)
+            may_come = may_enter(stands_on, comes_to) or reaches_over
+        else:  # it knows what is touched on all sides
+            may_come = walked >= on_arc or (comes_to < LETHAL_RANK and contact.allows(face, point, comes_to))
+        if not may_come:
             return obstacle_text(position_text(point))
         if ends and surface is not None:
             past = on_arc - walked - done

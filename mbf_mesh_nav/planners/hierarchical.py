@@ -23,8 +23,8 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult
 from mbf_mesh_nav.arrays import FlagArray
+from mbf_mesh_nav.map.ground import heights_text
 from mbf_mesh_nav.mesh.borders import on_surface
-from mbf_mesh_nav.mesh.ground import heights_text
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner

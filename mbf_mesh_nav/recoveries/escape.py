@@ -83,6 +83,7 @@ class EscapeRecovery(MeshRecovery, ManoeuvreRecovery):
 
     Parameters = EscapeParameters
     parameters: EscapeParameters
+    may_go_deeper = True
     _own_patch: BoolArray
 
     @classmethod

@@ -27,9 +27,9 @@ from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_mesh_nav.arrays import BoolArray, Float32Array
 from mbf_mesh_nav.kernels.motion.path_poses import poses_along
 from mbf_mesh_nav.layers.tilt import TiltLayer
+from mbf_mesh_nav.map.ground import ground_heights, heights_text
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.borders import on_surface
-from mbf_mesh_nav.mesh.ground import ground_heights, heights_text
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner, surface_point_at_vertex

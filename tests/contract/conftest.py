@@ -112,6 +112,10 @@ def world(request):
     def map_of(lethal):
         return make(lethal)
 
+    def inflated(lethal):
+        """A map that is inflated to 0.8 m."""
+        return make(lethal, inflation={"inflation_radius": 0.8})
+
     def sensing(rate=0.0):
         """A map without walls whose layer ``obstacle`` listens to the sensor ``scan``, inflated to 0.8 m."""
         source = {"expected_update_rate": rate}
@@ -134,7 +138,13 @@ def world(request):
 
     context = CostmapContext if costmap else MeshContext
     return SimpleNamespace(
-        backend=request.param, map_of=map_of, sensing=sensing, see=see, cost_at=cost_at, context=context
+        backend=request.param,
+        map_of=map_of,
+        inflated=inflated,
+        sensing=sensing,
+        see=see,
+        cost_at=cost_at,
+        context=context,
     )
 
 

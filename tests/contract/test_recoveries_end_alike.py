@@ -154,13 +154,52 @@ def test_the_robot_stands_while_the_map_is_stale_and_the_reason_is_said(world, r
 
 @pytest.mark.parametrize("name", [*MOVING, "escape"])
 def test_none_moves_where_it_could_not_stop_before_somebody(world, run, name):
-    """Also not one that may drive over what stands, as ``escape`` does."""
+    """Also not one that may drive over what stands, as ``escape`` does; it waits as long as the map allows."""
     navigation_map = world.map_of(lambda x, y: x > (2.6 if name == "escape" else 4.5))
-    navigation_map.safe_share = lambda *asked: (0.0, "object 3 moves in the way", 10.0)
+    navigation_map.safe_share = lambda *asked: (0.0, "object 3 moves in the way", 0.5)
     result, motion = run(name, navigation_map)
     assert result.outcome == RecoveryOutcome.IMPASSABLE
-    assert "object 3 moves in the way" in result.message
+    assert "object 3 moves in the way; waited 0.5 s for it" in result.message
     assert all(command.is_stopped() for command in motion.commands)
+    assert name == "give_way" or motion.seconds == pytest.approx(0.5, abs=0.1), "that one plans anew"
+
+
+def walks_by(until):
+    """``safe_share`` of a map on which somebody is in the way until a time [s], and again for 0.4 s a second later."""
+
+    def safe_share(pose, velocity, command, now):
+        in_the_way = now < until or until + 1.0 < now < until + 1.4
+        return (0.0, "object 3 moves in the way", 2.0) if in_the_way else (1.0, "", 0.0)
+
+    return safe_share
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_who_walks_by_is_waited_for_each_time_anew(world, run, name):
+    navigation_map = world.map_of(before_the_wall)
+    navigation_map.safe_share = walks_by(1.8)
+    result, motion = run(name, navigation_map)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert motion.seconds > 1.8 and motion.commands[0].is_stopped()
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_it_waits_no_longer_than_its_time(world, run, name):
+    navigation_map = world.map_of(before_the_wall)
+    navigation_map.safe_share = lambda *asked: (0.0, "object 3 moves in the way", 10.0)
+    result, motion = run(name, navigation_map, time_limit=1)
+    assert result.outcome == RecoveryOutcome.PAT_EXCEEDED
+    assert "not done after 1 s: object 3 moves in the way" in result.message
+    assert all(command.is_stopped() for command in motion.commands)
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_a_cancel_ends_its_waiting_at_once(world, run, name):
+    navigation_map = world.map_of(before_the_wall)
+    navigation_map.safe_share = walks_by(100.0)
+    result, motion = run(name, navigation_map, cancel=0.3)
+    assert result.outcome == RecoveryOutcome.CANCELED and "enough of this" in result.message
+    assert motion.seconds <= 0.4
 
 
 class RollingMotion(RigMotion):
@@ -220,6 +259,19 @@ def test_an_obstacle_ahead_is_impassable_with_the_place(world, run, name, start,
     assert result.outcome == RecoveryOutcome.IMPASSABLE
     assert "an obstacle is in the way" in result.message and "would touch it at (4." in result.message
     assert motion.end.x <= 4.5 - 0.2 + 0.02
+
+
+@pytest.mark.parametrize(("name", "sign"), [("back_up", -1.0), ("drive_on_heading", 1.0)])
+def test_along_a_wall_it_does_not_creep_into_it(world, run, name, sign):
+    """At 0.7 degrees each look ahead finds it less than a tenth of a cell deeper than it lies by then."""
+    start = Pose.planar(4.0 - 1.975 * sign, 3.22 if world.backend == "costmap" else 3.3, sign * 0.012)
+    navigation_map = world.inflated(lambda x, y: y > 3.42)
+    depth = navigation_map.contact_depth(start)
+    assert 0.0 < depth < 0.12
+    result, motion = run(name, navigation_map, start=start, distance=4.0, time_limit=60)
+    assert abs(motion.end.x - start.x) > 0.2, "along the wall it may move"
+    assert navigation_map.contact_depth(motion.end) < depth + 0.015, "4.7 cm, if each look begins anew"
+    assert result.outcome == RecoveryOutcome.IMPASSABLE and "would touch it at" in result.message
 
 
 @pytest.mark.parametrize("forward", [True, False])

@@ -11,11 +11,11 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.map.ground import ground_heights
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.places import OUTSIDE
 from mbf_mesh_nav.map.places import SURFACE_DISTANCE as OF_PLACES
 from mbf_mesh_nav.map.robot_outline import OutlinedMap
-from mbf_mesh_nav.mesh.ground import ground_heights
 from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE as OF_ROBOTS
 from mbf_mesh_nav.tiles.serving.moment import Moment
 
@@ -159,6 +159,11 @@ class TileQuestions(OutlinedMap):
         if there is None:
             return f"the robot is more than {OF_ROBOTS:g} m from the surface"
         return there
+
+    def contact_depth(self, pose: Pose) -> float:
+        """How deep [m] the robot's disc lies in lethal ground; 0 where its centre may stand."""
+        there = self.around(pose.x, pose.y, OF_ROBOTS + 2.0 * self.robot_reach)
+        return 0.0 if there is None else there.contact_depth(pose)
 
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
         """Offset [m] to the nearest lethal vertex of the robot's storey; None if none is ``within`` [m].

@@ -6,10 +6,10 @@ import pytest
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
+from mbf_mesh_nav.map.ground import ground_heights
 from mbf_mesh_nav.map.map_builder import build_mesh_map
 from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
-from mbf_mesh_nav.mesh.ground import ground_heights
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.planners.astar import AStarPlanner
 

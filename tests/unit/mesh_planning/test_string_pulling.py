@@ -11,8 +11,8 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_abstract.time.cancel import CancelToken
+from mbf_mesh_nav.map.ground import ground_heights
 from mbf_mesh_nav.map.mesh_map import MeshMap
-from mbf_mesh_nav.mesh.ground import ground_heights
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.refiners.string_pulling import StringPullingRefiner

@@ -20,7 +20,7 @@ from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.contract import check_planner
 from mbf_abstract.testing.contract.rig import rig
 from mbf_abstract.testing.loopback import LoopbackSession
-from mbf_mesh_nav.mesh.ground import ground_heights
+from mbf_mesh_nav.map.ground import ground_heights
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.hierarchical import HierarchicalPlanner
