@@ -25,6 +25,7 @@ from typing import Any
 
 from numba import config, njit
 from numba.core import event
+from numba.core.registry import CPUDispatcher
 
 from mbf_abstract.compiling.compilation import CompilerClock
 from mbf_abstract.compiling.garbage import PatientCollector
@@ -33,6 +34,14 @@ from mbf_abstract.compiling.shared_cache import share_cache
 _OPTIONS: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True}
 """Kernels run without the interpreter lock; none is called from C, so the wrapper for that is not compiled."""
 _deciding_where = threading.Lock()
+
+
+class StepDispatcher(CPUDispatcher):  # type: ignore[misc]
+    """Stands in for a step that was compiled without a wrapper for Python, which would be run all the same."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Refuse the call: it would jump to address 0."""
+        raise TypeError(f"{self.py_func.__qualname__} is a step of other kernels, call one of those")
 
 
 def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
@@ -57,13 +66,20 @@ def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
         return function
     cache = cache_folder(Path(inspect.getfile(function)))
     if cache is None:
-        return njit(**_OPTIONS, **options)(function)
+        return _stand_in(function, options)
     with _deciding_where:  # numba asks for the folder once, when it wraps the function
         usual, config.CACHE_DIR = config.CACHE_DIR, str(cache)
         try:
-            return share_cache(njit(**_OPTIONS, **options)(function), function)
+            return share_cache(_stand_in(function, options), function)
         finally:
             config.CACHE_DIR = usual
+
+
+def _stand_in(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    dispatcher = njit(**_OPTIONS, **options)(function)
+    if options.get("no_cpython_wrapper"):
+        dispatcher.__class__ = StepDispatcher
+    return dispatcher
 
 
 def cache_folder(file: Path) -> Path | None:

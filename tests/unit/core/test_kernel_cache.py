@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numba
@@ -138,3 +139,22 @@ def test_a_record_names_kernels_that_are_kept_and_not_what_numba_needs_for_them(
         assert compile_lazily(space["ones"])(3) == 3.0
 
     assert compiled.kernels == ["kernels.ones"] and compiled.kept and compiled.seconds > 0.0
+
+
+@partial(compile_lazily, no_cpython_wrapper=True)
+def twice(x):
+    """A step without a wrapper for Python."""
+    return 2 * x
+
+
+@compile_lazily
+def four_times(x):
+    """A kernel that calls it."""
+    return twice(twice(x))
+
+
+def test_a_step_that_is_called_from_python_is_an_error_that_names_it():
+    for _ in ("never compiled", "compiled for a kernel"):
+        with pytest.raises(TypeError, match="twice is a step of other kernels, call one of those"):
+            twice(3)
+        assert four_times(3) == 12
