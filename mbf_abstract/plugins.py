@@ -64,6 +64,8 @@ class PluginContext:
         a controller may widen limits of its own.
     min_turning_radius : float
         Radius [m] of the robot's tightest curve when the plugin is loaded; 0 = it turns on the spot.
+    may_reverse : bool
+        Whether the server lets the robot drive backward, by its ``min_vel_x``.
     traffic : Traffic
         What other robots with this navigation announce; empty unless the server is connected to some.
     """
@@ -75,6 +77,7 @@ class PluginContext:
     robot: RobotInformation
     relaxation: Relaxation = field(default_factory=Relaxation, kw_only=True)
     min_turning_radius: float = field(default=0.0, kw_only=True)
+    may_reverse: bool = field(default=True, kw_only=True)
     traffic: Traffic = field(default_factory=Traffic, kw_only=True)
 
 
@@ -111,6 +114,7 @@ class Plugin(ABC):
         self.robot = context.robot
         self.relaxation = context.relaxation
         self.min_turning_radius = context.min_turning_radius
+        self.may_reverse = context.may_reverse
         self.traffic = context.traffic
 
     def cancel(self) -> bool:

@@ -144,6 +144,7 @@ class PluginHost(ABC):
             runtime.robot,
             relaxation=runtime.relaxation,
             min_turning_radius=runtime.gate.limits.min_turning_radius,
+            may_reverse=runtime.gate.limits.min_vel_x < 0.0,
             traffic=runtime.traffic,
         )
         instance: Plugin = spec.plugin_class(self.make_context(spec.kind, spec.options, base))

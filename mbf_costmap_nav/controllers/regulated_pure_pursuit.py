@@ -21,7 +21,6 @@ from mbf_abstract.maps.controllers.continued_path import carried_over
 from mbf_abstract.maps.controllers.end_of_path import at_exact_end, swept_poses, turn_left
 from mbf_abstract.maps.controllers.failures import blocked_path, obstacle_text
 from mbf_abstract.maps.controllers.room_to_turn import (
-    CREEPING,
     SMALL_TURN,
     RoomToTurn,
     along_path,
@@ -33,9 +32,9 @@ from mbf_abstract.maps.controllers.room_to_turn import (
     wider_curves,
 )
 from mbf_abstract.maps.controllers.tight_places import CLOSE_FROM, CLOSELY, TightPlaces
+from mbf_abstract.maps.controllers.way_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
-from mbf_costmap_nav.control.leaving_contact import turn_that_leads_out
 from mbf_costmap_nav.control.path_geometry import look_ahead_point
 from mbf_costmap_nav.control.path_handling import ControlCycle, to_base_frame
 from mbf_costmap_nav.control.regulated_speed import RegulatedFollower
@@ -46,7 +45,7 @@ SWEEP_STEP = 0.1  # cells; from pose to pose of a turn at the goal, which must l
 SLOWEST = 0.01  # m/s; slower commands are looked ahead for as long as this one, to bound the work
 
 
-class RegulatedPurePursuitController(RegulatedFollower):
+class RegulatedPurePursuitController(LeavesContacts, RegulatedFollower):
     """Carrot follower with regulated speed."""
 
     leaves_contacts = True
@@ -78,13 +77,12 @@ class RegulatedPurePursuitController(RegulatedFollower):
 
     def _way_out(self, cycle: ControlCycle) -> Twist | None:
         """The motion that leads straight out of what is touched; None for a car, at the goal and where none does."""
-        if not (cycle.touches and self.rotates) or self._turn_at_goal(cycle) is not None:
+        if not self.rotates or self._turn_at_goal(cycle) is not None:
             return None
-        backward = self._backward(cycle)
-        angle = turn_that_leads_out(cycle, self._angle_left(cycle), backward)
-        if angle == 0.0:
-            return self._slowed(Twist.planar(-CREEPING if backward else CREEPING), cycle.request.velocity)
-        return None if angle is None else self._turn(cycle, angle)
+        gears, pose = Gears(self._backward(cycle), self.may_reverse, True), cycle.request.pose
+        asked = self._angle_left(cycle), lambda angle: self._turn(cycle, angle), gears
+        out = self.leaving.command(self.costmap, pose, *asked, OnPath(cycle.tracker, pose, gears.backward))
+        return out if out is None or out.vx == 0.0 else self._slowed(out, cycle.request.velocity)
 
     def _motions(self, cycle: ControlCycle) -> list[Twist]:
         """The motion that is wanted, then those that make room for it."""
@@ -210,6 +208,8 @@ class RegulatedPurePursuitController(RegulatedFollower):
 
     def _blocked(self, cycle: ControlCycle, command: Twist) -> str:
         """Where a command leads into an obstacle in the check time, not beyond the next cusp; empty if free."""
+        if command.vx == 0.0 and self.costmap.unpadded_footprint.is_circle:
+            return ""  # whatever the polygon does that stands for it
         if self._at_goal and command.vx == 0.0:
             return self._blocked_at_goal(cycle, command)
         duration, shortest = self.parameters.check_ahead_time, self.parameters.min_distance_to_obstacle

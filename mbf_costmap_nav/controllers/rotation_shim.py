@@ -89,7 +89,7 @@ class RotationShimController(PathFollower):
         limit = (
             self.parameters.angular_done_threshold if self._turning(cycle) else self.parameters.angular_dist_threshold
         )
-        self._aligning = self._aligning and abs(angle) > limit
+        self._aligning = self._aligning and abs(angle) > limit and not cycle.touches  # the inner one gets it out
         command = self._rotation(angle, request.velocity.wz)
         if not self._aligning or self._sweeps_obstacle(cycle, command):
             return self._inner.compute_velocity_commands(request)

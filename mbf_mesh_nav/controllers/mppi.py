@@ -23,7 +23,6 @@ from mbf_abstract.geometry.arithmetic import exp, norm
 from mbf_abstract.geometry.polyline import reverse_segments
 from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
 from mbf_abstract.maps.controllers.failures import missed_path, no_motion
-from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
 from mbf_abstract.maps.tracking.avoidance import Encounters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
@@ -131,11 +130,11 @@ class MPPIController(SamplingFollower):
         if not self._begun:
             self._begin(spot, pose)
         self._tracker.update(spot.point)
+        limits = self._motions.limits
         if missed := missed_path(self._tracker, p.max_path_distance * self.limit_factor):
             return missed
         if approach.is_only_turning(pose, self._tracker):
             return self._turn_at_goal(pose, approach)
-        limits = MotionLimits(p.min_vel_x, p.max_vel_x, p.max_vel_theta, p.motion_model == "ackermann")
         around = MovingAround.on(self.mesh_map, pose, self.clock.now(), p.moving_objects)
         return self._keeping.choose(request, limits, p.standing, around, lambda: self._sampled(spot, pose, around))
 

@@ -18,10 +18,12 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to, in_robot_frame
 from mbf_abstract.geometry.tangent_plane import heading_error
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_path
+from mbf_abstract.maps.controllers.way_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.map.places import FORBIDDEN_COST
 from mbf_mesh_nav.motion.goal_approach import GoalApproach, braking_speed, clamp, tracker_on_surface
 from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, SurfaceFollower
 
@@ -63,7 +65,7 @@ class PathFollowerParameters(PluginParameters):
     )
 
 
-class PathFollower(SurfaceFollower):
+class PathFollower(LeavesContacts, SurfaceFollower):
     """Pure pursuit on the surface."""
 
     Parameters = PathFollowerParameters
@@ -96,9 +98,12 @@ class PathFollower(SurfaceFollower):
             return cycle
         surface, approach = cycle
         self._tracker.update(surface.point)
+        is_turning = approach.is_only_turning(pose, self._tracker)
         if missed := missed_path(self._tracker, self.parameters.max_path_distance * self.limit_factor):
             return missed
-        if approach.is_only_turning(pose, self._tracker):
+        if not is_turning and (out := self._way_out(pose)) is not None:
+            return self._command(out.vx, out.wz)
+        if is_turning:
             turn = self.parameters.turn_gain * heading_error(pose, approach.goal)
             return self._command(0.0, turn)
         if obstacle := self._obstacle_on_path(surface.point):
@@ -112,14 +117,26 @@ class PathFollower(SurfaceFollower):
         places = np.concatenate([here[None], self._tracker.points_at(self._tracker.progress + ahead)])
         return self.obstacle_along(places, self.parameters.max_surface_distance, self.parameters.cost_limit)
 
+    def _way_out(self, pose: Pose) -> Twist | None:
+        """The motion straight out of what the robot touches; None without one, or where it may drive on such ground."""
+        if self.parameters.cost_limit > FORBIDDEN_COST:
+            return None
+        bearing, _ = arc_to(pose, self._target())
+        gears, on_path = Gears(reverses=self.may_reverse), OnPath(self._tracker, pose)
+        return self.leaving.command(self.mesh_map, pose, bearing, self._turn, gears, on_path)
+
+    def _turn(self, angle: float) -> Twist:
+        return Twist.planar(wz=self.parameters.turn_gain * angle)
+
+    def _target(self) -> FloatArray:
+        """The pursued point (3,) [m]."""
+        tracker, ahead = self._tracker, self.parameters.look_ahead_dist
+        return tracker.point_at(tracker.progress + ahead) if tracker.on_last_section else tracker.straight_on(ahead)
+
     def _pursue(self, pose: Pose, slope: float) -> ControlResult:
         """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""
         p = self.parameters
-        tracker = self._tracker
-        if tracker.on_last_section:
-            target = tracker.point_at(tracker.progress + p.look_ahead_dist)
-        else:
-            target = tracker.straight_on(p.look_ahead_dist)
+        tracker, target = self._tracker, self._target()
         bearing, curvature = arc_to(pose, target)
         if abs(bearing) > p.rotate_to_heading_min_angle:
             return self._command(0.0, p.turn_gain * bearing)

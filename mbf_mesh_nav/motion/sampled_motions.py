@@ -10,10 +10,12 @@ import numpy as np
 
 from mbf_abstract.geometry import AckermannCommand, Command, Twist
 from mbf_abstract.geometry.arithmetic import tan
+from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
 from mbf_abstract.maps.controllers.standing import StandingParameters
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.map.places import FORBIDDEN_COST
 from mbf_mesh_nav.motion.goal_approach import clamp
 
 _LEAST_STRIDE = 0.05  # [m] between two looks at the ground; only obstacles without inflation are thinner
@@ -87,6 +89,13 @@ class SampledMotions:
         if self.min_turning_radius == 0.0:
             return p.max_steering_angle
         return min(p.max_steering_angle, math.atan(self.wheelbase / self.min_turning_radius))
+
+    @property
+    def limits(self) -> MotionLimits:
+        """What may be commanded; who may drive on ground that the map forbids does not leave it."""
+        p = self.parameters
+        is_car, leaves_contacts = p.motion_model == "ackermann", p.cost_limit <= FORBIDDEN_COST
+        return MotionLimits(p.min_vel_x, p.max_vel_x, p.max_vel_theta, is_car, leaves_contacts=leaves_contacts)
 
     @property
     def turning_radius(self) -> float:

@@ -192,15 +192,16 @@ def test_a_robot_whose_turns_cancel_out_does_not_drive_straight_into_somebody(ma
 
 
 def test_a_recovery_touches_nobody_either(make_map_server):
+    """It waits until they have walked on, who look at nothing; on the mesh what is marked now ends it before that."""
     with site(make_map_server, **PARAMETERS) as made:
         walker = Walker(made.rig, 0.4, 4.0, 0.3, 0.0)
         made.rig.clock.sleep(1.5)
         result = made.navigator.recover("back_up")
-        assert result.outcome == RecoveryOutcome.IMPASSABLE
-        assert "in the way" in result.message
-        if made.server.backend == "costmap":  # on the mesh what is marked now is in the way even sooner
-            assert re.search(r"object \d+ moves in the way, at \(\d\.\d\d, \d\.\d\d\)", result.message)
-        assert walker.touched_by != "robot"
+        if made.server.backend == "costmap":
+            assert result.success and walker.touched_by == "walker", result.message
+        else:
+            assert result.outcome == RecoveryOutcome.IMPASSABLE and "in the way" in result.message
+            assert walker.touched_by != "robot"
 
 
 def test_a_guard_that_raises_holds_the_robot(make_map_server):

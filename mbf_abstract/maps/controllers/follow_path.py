@@ -34,6 +34,7 @@ from mbf_abstract.maps.controllers.room_to_turn import (
 )
 from mbf_abstract.maps.controllers.tight_places import CLOSE_FROM, CLOSELY, TightPlaces, outline_fits
 from mbf_abstract.maps.controllers.turn_at_goal import TurnAtGoal, from_goal
+from mbf_abstract.maps.controllers.way_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.queries import AS_CONFIGURED, PADDED, CellState
 from mbf_abstract.outcomes import ExePathOutcome
@@ -45,7 +46,7 @@ AT_END = 0.05  # m; nearer to the goal a robot only turns to its heading, unless
 SHORTEST_CHECK = 0.05  # s
 
 
-class FollowPath(MapPlugin, AbstractController):
+class FollowPath(LeavesContacts, MapPlugin, AbstractController):
     """Steers along the arc to a point ahead on the path."""
 
     Parameters: ClassVar[type[PluginParameters]] = FollowPathParameters
@@ -90,10 +91,8 @@ class FollowPath(MapPlugin, AbstractController):
             return no_path()
         tracker.update((pose.x, pose.y))
         self._update_end(pose, tracker)
-        factor = self.relaxation.slack(self.clock.now()).controller_factor
-        if missed := missed_path(
-            tracker, p.max_path_distance * factor, storeys_off(pose, tracker, self.navigation_map)
-        ):
+        farthest = p.max_path_distance * self.relaxation.slack(self.clock.now()).controller_factor
+        if missed := missed_path(tracker, farthest, storeys_off(pose, tracker, self.navigation_map)):
             return missed
 
         def blocked(motion: Twist) -> str:
@@ -107,25 +106,29 @@ class FollowPath(MapPlugin, AbstractController):
             there = self.on_map(pose)
             if self.navigation_map.point_check()(there).state is CellState.OUTSIDE:
                 return outside_map(f"({there.x:.2f}, {there.y:.2f})")
-            motions = self._motions(pose, tracker)
+            if (out := self.way_out(pose)) is not None:
+                return ControlResult(ExePathOutcome.SUCCESS, "", out)
+            motions, along = self._motions(pose, tracker), lambda: self._along_path(pose, tracker, p.look_ahead_dist)
             command, obstacle = self._room_to_turn.choose(
-                pose,
-                tracker.progress,
-                motions,
-                p.make_room_dist,
-                blocked,
-                lambda: self._along_path(pose, tracker, p.look_ahead_dist),
+                pose, tracker.progress, motions, p.make_room_dist, blocked, along
             )
         except TransformError as error:
             return ControlResult(ExePathOutcome.TF_ERROR, str(error))
-        turns = self._turn_at_goal.is_turning
-        if not turns and self._tight_places.drives_otherwise(tracker, motions[0], command):
+        if not self._turn_at_goal.is_turning and self._tight_places.drives_otherwise(tracker, motions[0], command):
             return self.compute_velocity_commands(request)
         if obstacle and (self._tight_places.begin_next_stroke(tracker) or self._ends_here(pose, tracker)):
             return self.compute_velocity_commands(request)
         if obstacle:
             return blocked_path(self.navigation_map, there, obstacle)
         return ControlResult(ExePathOutcome.SUCCESS, "", command)
+
+    def way_out(self, pose: Pose) -> Twist | None:
+        """The motion straight out of what the robot touches at ``pose``, in the frame of the path; None without one."""
+        if (tracker := self._tracker) is None or self._turn_at_goal.is_turning:
+            return None
+        gears = Gears(self._backward(tracker), self.may_reverse)
+        asked = self._angle_left(pose, tracker), self._turn, gears, OnPath(tracker, pose, gears.backward, self.on_map)
+        return self.leaving.command(self.navigation_map, self.on_map(pose), *asked)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the path has been driven to its end, and the pose is within both tolerances of it."""
@@ -138,10 +141,7 @@ class FollowPath(MapPlugin, AbstractController):
         return tracker.has_arrived(dist_tolerance) and gap <= dist_tolerance and abs(turn) <= angle_tolerance
 
     def _motions(self, pose: Pose, tracker: PathTracker) -> list[Twist]:
-        """A turn on the spot at a large heading error, or at the goal to its heading; else a drive along the arc.
-
-        After the wanted motion come those that make room for it.
-        """
+        """A turn at a large heading error, or at the goal to its heading, else an arc; then what makes room for it."""
         p = self.parameters
         backward = self._backward(tracker)
         gap, turn = self._from_goal(pose, tracker)

@@ -26,10 +26,12 @@ from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.failures import stands
 from mbf_abstract.maps.controllers.follow_path import FollowPath
 from mbf_abstract.maps.controllers.follow_path_parameters import FollowPathParameters
+from mbf_abstract.maps.controllers.room_to_turn import CREEPING
 from mbf_abstract.maps.controllers.standing import Standing, StandingParameters
 from mbf_abstract.maps.controllers.tight_places import HEADINGS
 from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.tracking.avoidance import MovingAround
+from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
 
 AWAY, AHEAD, FAR = 0.5, 0.25, 2.0
@@ -54,6 +56,8 @@ class MotionLimits:
         Whether the robot cannot turn on the spot.
     gain, turn_gain : float
         By how much [m/s, rad/s] a speed or yaw rate may exceed the measured one.
+    leaves_contacts : bool
+        False = the controller may drive on ground that the map forbids: what the map calls a contact is none for it.
     """
 
     slowest: float
@@ -62,6 +66,7 @@ class MotionLimits:
     is_car: bool = False
     gain: float = math.inf
     turn_gain: float = math.inf
+    leaves_contacts: bool = True
 
     def hold(self, command: Twist, measured: Twist) -> Twist:
         """The same arc within the limits."""
@@ -110,6 +115,15 @@ class KeepingToPath:
         reached = self._follower.is_goal_reached(pose, dist_tolerance, angle_tolerance)
         return reached and self._follower.ended_early
 
+    def out_of_contact(self, request: ControlRequest, limits: MotionLimits) -> ControlResult | None:
+        """The answer that leads straight out of what the robot touches; None for a car, and where there is none."""
+        out = self._follower.way_out(request.pose) if limits.leaves_contacts and not limits.is_car else None
+        if out is None:
+            return None
+        self.is_keeping = True
+        limits = replace(limits, slowest=min(limits.slowest, -CREEPING))
+        return ControlResult(ExePathOutcome.SUCCESS, "", limits.hold(out, request.velocity))
+
     def choose(
         self,
         request: ControlRequest,
@@ -137,6 +151,9 @@ class KeepingToPath:
         """
         now = self._follower.clock.now()
         stood = self._standing.time(now, limits.fastest, limits.turning)
+        if (out := self.out_of_contact(request, limits)) is not None:
+            self._standing.commanded(out.command)
+            return out
         along, reason = None, ""
         keeps = not limits.is_car and (
             self._has_stood(request.pose, stood >= p.keep_to_path_after)

@@ -10,7 +10,7 @@ nothing the map knows: back into a bay, around a corner, or a step aside in a ha
 tracked near its path is taken to go beside it, and that path is kept free, too, where there is such a place. The
 manoeuvre is driven slowly, each command checked as in every recovery, and searched anew where one is refused (see
 ``pulling_out``); afterwards it stands for a time that is drawn anew for each run, or until those who were tracked on
-its path have left it. Where there is no such place it ends with IMPASSABLE at once.
+its path, since it set out, have left it. Where there is no such place it ends with IMPASSABLE at once.
 
 Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
 goes first waits until the others have left its path; the others pull out, also off the path that the first one has
@@ -26,7 +26,7 @@ The server's ``recovery_patience`` must leave time for drive and wait.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import ClassVar
@@ -34,7 +34,7 @@ from typing import ClassVar
 import numpy as np
 
 from mbf_abstract.drive.robot import RobotStateError
-from mbf_abstract.geometry import FloatArray, Pose
+from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.pull_out import in_plane_of, paths_beside, paths_to_keep_free
 from mbf_abstract.maps.recoveries.pulling_out import PullingOutParameters, PullingOutRecovery
@@ -74,6 +74,10 @@ class GiveWayRecovery(PullingOutRecovery):
 
     Parameters: ClassVar[type[PluginParameters]] = GiveWayParameters
     parameters: GiveWayParameters
+    _left_at: Pose | None = None
+    """Where it has set out to pull out."""
+    _seen = False
+    """Whether somebody has been on its path since then."""
 
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Pull out and wait, or wait first, where the right of way is this robot's; then forget where others stood."""
@@ -97,13 +101,14 @@ class GiveWayRecovery(PullingOutRecovery):
                 self.traffic.wait_was_in_vain(rivals)
         before = self._before(rivals)
         self.traffic.yields = True
-        begin = request.motion.pose()
+        begin = self._left_at = request.motion.pose()
+        self._seen = False
         try:
             result = self.pull_out(request, self._keep_free, "its path")
             if result.success:
                 return self._stand_aside(request, begin, before)
         finally:
-            self.traffic.yields = False
+            self.traffic.yields, self._left_at = False, None
         return self._without_room(request, before, result) if result.outcome in NOT_THERE else result
 
     def _ask_for_room(self, request: RecoveryRequest, rivals: Sequence[Announcement]) -> RecoveryResult:
@@ -114,6 +119,22 @@ class GiveWayRecovery(PullingOutRecovery):
         finally:
             self.traffic.ask(False)
 
+    def drive(
+        self,
+        request: RecoveryRequest,
+        velocity: Callable[[Pose], Twist | RecoveryResult],
+        finished: Callable[[Pose], bool] = lambda _: False,
+        obstacle_ahead: Callable[[Pose, Twist], str] | None = None,
+    ) -> RecoveryResult:
+        """As every recovery; who is on the path that it leaves is noted, as they may have passed when it stands."""
+
+        def looks_and_finished(pose: Pose) -> bool:
+            if self._left_at is not None:
+                self._seen = self._seen or self._somebody_on_the_path(self._left_at, pose)
+            return finished(pose)
+
+        return super().drive(request, velocity, looks_and_finished, obstacle_ahead)
+
     def _stand_aside(self, request: RecoveryRequest, begin: Pose, before: list[Announcement]) -> RecoveryResult:
         """Wait beside the path, until the robots that go first have passed."""
         p, place = self.parameters, request.motion.pose()
@@ -123,13 +144,13 @@ class GiveWayRecovery(PullingOutRecovery):
         return replace(result, message=f"{result.message} at ({place.x:.2f}, {place.y:.2f}), beside its path")
 
     def _stand_until_clear(self, request: RecoveryRequest, begin: Pose, duration: float) -> RecoveryResult:
-        """Stand for a time [s]; less, where somebody is seen on the way that it left at ``begin``, and then nobody."""
-        place, begun, seen, result = request.motion.pose(), self.clock.now(), False, RecoveryResult(0)
+        """Stand for a time [s]; less, where somebody was seen on the way that it left at ``begin``, and now nobody."""
+        place, begun, result = request.motion.pose(), self.clock.now(), RecoveryResult(0)
         while result.success and (left := begun + duration - self.clock.now()) > 0.0:
             present = self._somebody_on_the_path(begin, place)
-            if seen and not present:
+            if self._seen and not present:
                 break
-            seen = seen or present
+            self._seen = self._seen or present
             result = stand(request, min(left, WAIT_PERIOD))
         waited = f"waited {self.clock.now() - begun:.3g} s"
         return replace(result, message=waited) if result.success else result

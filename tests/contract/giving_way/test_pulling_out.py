@@ -77,6 +77,23 @@ def test_it_waits_no_longer_than_until_who_was_on_its_way_has_passed(give_way, w
     assert result.success and motion.seconds < 15.0
 
 
+def test_it_waits_for_nobody_who_has_passed_before_it_stands(give_way, world):
+    """They come at 0.9 m/s; without anybody it waits its time, as whom it gives way to may be out of its sight."""
+    seen, seconds = world.sensing(), []
+    for anybody in (True, False):
+        asked = []
+
+        def passing(now, asked=asked, anybody=anybody):
+            asked.append(now)
+            return (tracked(5.2 - 0.9 * (now - asked[0]), 3.0, -0.9, Motion.MOVING),) if anybody else ()
+
+        seen.tracked_objects = passing
+        result, motion = give_way(hall, distance=0.6, navigation_map=seen, wait=30.0, random_extra=0.0)
+        assert result.success and ("waited 0 s" in result.message) == anybody, result.message
+        seconds.append(motion.seconds)
+    assert seconds[0] < 15.0 < 30.0 < seconds[1]
+
+
 def test_where_the_drive_to_the_place_is_not_free_any_more_another_place_is_searched(give_way, world):
     """On the side to which it steps aside a wall is seen that was not there when it set out."""
     seen, sides = world.sensing(), []
