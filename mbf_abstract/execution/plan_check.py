@@ -13,10 +13,9 @@ from mbf_abstract.event_values import error_text
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import Transform, TransformError
-from mbf_abstract.goals.goal_area import GoalArea
+from mbf_abstract.goals.goal_area import GoalArea, TransformedArea
 from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal
 from mbf_abstract.goals.result_types import GetPathResult
-from mbf_abstract.goals.transformed_area import TransformedArea
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 

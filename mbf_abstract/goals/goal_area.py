@@ -18,6 +18,7 @@ import numpy as np
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.polygon import inside_polygon
 from mbf_abstract.geometry.tangent_plane import SAME_STOREY, heading_error
+from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 
@@ -192,3 +193,32 @@ def plan_to_area(make_plan: Callable[[PlanRequest], PlanResult], request: PlanRe
 def _cost(answer: PlanResult) -> float:
     assert answer.path is not None
     return answer.cost if answer.cost != 0.0 else answer.path.length
+
+
+@dataclass(frozen=True)
+class TransformedArea(GoalArea):
+    """An area of any kind, placed once: it stays where it is if the frames move against each other later.
+
+    Attributes
+    ----------
+    area : GoalArea
+        In the child frame of the transform.
+    transform : Transform
+        From the frame of the area to the one in which it is asked for.
+    """
+
+    area: GoalArea
+    transform: Transform
+
+    @property
+    def frame_id(self) -> str:
+        """Frame in which it is asked for."""
+        return self.transform.parent
+
+    def depth(self, pose: Pose) -> float:
+        """That of the pose in the frame of the area."""
+        return self.area.depth(self.transform.inverse().apply_to_pose(pose))
+
+    def members(self) -> tuple[Pose, ...]:
+        """Those of the area."""
+        return tuple(self.transform.apply_to_pose(member) for member in self.area.members())

@@ -20,8 +20,7 @@ from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE
-from mbf_abstract.maps.tracking.motion_changes import MotionChanges
-from mbf_abstract.maps.tracking.objects import TrackedObject
+from mbf_abstract.maps.tracking.objects import MotionChanges, TrackedObject
 from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_abstract.parameters import ParameterModel, with_changes
 from mbf_abstract.time.ticker import Ticker

@@ -7,11 +7,17 @@ weight to ``CriticParameters`` under the same name.
 
 from collections.abc import Callable
 
-from mbf_costmap_nav.critics.goal_critics import goal, goal_angle
-from mbf_costmap_nav.critics.motion_critics import prefer_forward, twirling
 from mbf_costmap_nav.critics.obstacle_critic import obstacle
-from mbf_costmap_nav.critics.path_critics import path_align, path_angle, path_follow
 from mbf_costmap_nav.critics.rollouts import CriticParameters, Float32Array, Rollouts
+from mbf_costmap_nav.critics.terms import (
+    goal,
+    goal_angle,
+    path_align,
+    path_angle,
+    path_follow,
+    prefer_forward,
+    twirling,
+)
 
 Critic = Callable[[Rollouts], Float32Array | None]
 

@@ -31,7 +31,7 @@ from mbf_abstract.maps.tracking.moving_obstacles import (
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, INSCRIBED, LETHAL, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.kernels.map.discs import raise_discs
+from mbf_costmap_nav.kernels.map.rasterisation import raise_discs
 from mbf_costmap_nav.map.layer import CombinationMethod, GridLayer, LayerContext, clear_cells, combine, shifted
 
 

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 
 from mbf_abstract.access.page_access import Role
-from mbf_ros.rosbridge.protocol import Operation, OperationError, number_in, text_in
+from mbf_ros.rosbridge.protocol import Operation, OperationError, frame, number_in, text_in
 
 MAX_SKEW = 5  # s between the clocks of client and server
 MAX_TIME = 2**53
@@ -48,3 +48,22 @@ class Authentication:
                 self._used.append(code)
                 return role
         raise OperationError("auth: the code is wrong, too old, or was used before")
+
+
+VALIDITY = 60  # s
+
+
+def auth_frame(secret: str, now: Callable[[], float], rand: Callable[[], str]) -> str:
+    """Return the operation ``auth`` of a client, which proves that it knows a secret.
+
+    Parameters
+    ----------
+    now : callable
+        Seconds since 1970.
+    rand : callable
+        Makes a text that was never used before.
+    """
+    start = int(now())
+    said = {"client": "mbf", "dest": "robot", "rand": rand(), "t": start, "level": "user", "end": start + VALIDITY}
+    code = hashlib.sha512(f"{secret}{''.join(map(str, said.values()))}".encode()).hexdigest()
+    return frame("auth", mac=code, **said)

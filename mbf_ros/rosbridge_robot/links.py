@@ -12,12 +12,12 @@ from functools import partial
 from mbf_abstract.event_values import error_text
 from mbf_abstract.time.clock import Clock, unix_seconds
 from mbf_ros.ros2.robot import Arrivals
+from mbf_ros.rosbridge.authentication import auth_frame
 from mbf_ros.rosbridge.protocol import Operation, OperationError, frame
 from mbf_ros.rosbridge_robot.connection import Backoff, Connection, NotConnectedError
 from mbf_ros.rosbridge_robot.dialing import LinkError, dial
 from mbf_ros.rosbridge_robot.frames import cbor_decoder, operation_of
 from mbf_ros.rosbridge_robot.options import LinkOptions
-from mbf_ros.rosbridge_robot.proof import auth_frame
 from mbf_ros.rosbridge_robot.topics import Reports
 
 SERVER = "the server of the robot"

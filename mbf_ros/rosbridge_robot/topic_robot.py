@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Command
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
@@ -23,8 +22,8 @@ from mbf_ros.rosbridge.topics import TopicTable
 WATCH_PERIOD = 0.02  # s between two looks at what fails to come: less than a control period
 
 
-class TopicRobot:
-    """The driver of such a robot.
+class TopicRobot(RosRobot):
+    """The driver of such a robot; its ``send_command`` hands a command on to be published.
 
     Parameters
     ----------
@@ -52,27 +51,10 @@ class TopicRobot:
         uses_odometry: bool = True,
     ) -> None:
         self.on_command: list[Callable[[Command], None]] = []
-        self._transforms, self._now = transforms, clock.now
-        self._arrivals, self._uses_odometry = Arrivals(clock.now), uses_odometry
+        self._uses_odometry, arrivals = uses_odometry, Arrivals(clock.now)
         if uses_odometry:
-            self._arrivals.expect(absolute(ODOM))
-        self._watched = RosRobot(self._publish, transforms, clock, self._arrivals, frames, max_silence)
-
-    def send_command(self, command: Command) -> None:
-        """Hand a command on to be published; a motion raises SilenceError while something fails to come."""
-        self._watched.send_command(command)
-
-    def odometry(self) -> Odometry:
-        """The last odometry; raises SilenceError while something fails to come."""
-        return self._watched.odometry()
-
-    def problem(self) -> str:
-        """What fails to come; empty if all does."""
-        return self._watched.problem()
-
-    def problems(self) -> dict[str, str]:
-        """What is wrong with each topic that must come, and with the robot's transform; empty where nothing is."""
-        return self._watched.problems()
+            arrivals.expect(absolute(ODOM))
+        super().__init__(self._hand_on, transforms, clock, arrivals, frames, max_silence)
 
     def listen(
         self,
@@ -95,11 +77,11 @@ class TopicRobot:
             if topic not in sensors or server.listens_to(sensors[topic][1]):
                 self._arrivals.hear(absolute(topic))
 
-        inputs = RobotInputs(self._now, lambda: context, hear)
-        of_robot = inputs.of_robot(self._watched, self._transforms, self._uses_odometry)
+        inputs = RobotInputs(self._clock.now, lambda: context, hear)
+        of_robot = inputs.of_robot(self, self._transforms, self._uses_odometry)
         for one in (*of_robot, *inputs.of_sensors(server.take_scan, sensors)):
             topics.add_input(absolute(one.topic), one.type, one.take)
 
-    def _publish(self, command: Command) -> None:
+    def _hand_on(self, command: Command) -> None:
         for listener in self.on_command:
             listener(command)

@@ -38,7 +38,7 @@ def show(
     with readable_errors():
         from terrain.description.describe import describe
         from terrain.description.facts import lines_of, to_json
-        from terrain.description.stated import stated_robot
+        from terrain.description.parameters import stated_robot
 
         described = describe(stated_robot(robot, settings))
         if png is not None:

@@ -1,12 +1,17 @@
-"""What a user may state about a robot that has a URDF; all that is not stated is found from it."""
+"""What a user may state about a robot that has a URDF, here or on a command line; the rest is found from it."""
 
 from __future__ import annotations
 
 import math
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
+import yaml
 from pydantic import field_validator, model_validator
 
+from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.validation import validate
+from mbf_abstract.config.yaml_source import YamlDocument
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.description.outline import surrounds_base
 
@@ -92,3 +97,28 @@ def _goes_around_once(corners: Corners) -> bool:
         (after - before) % math.tau for before, after in zip(headings, [*headings[1:], headings[0]], strict=True)
     )
     return turned < 1.5 * math.tau
+
+
+def stated_robot(urdf: str, settings: list[str]) -> UrdfRobot:
+    """Make a robot's parameters from a URDF and ``KEY=VALUE`` texts of a command line, whose values are YAML.
+
+    Raises
+    ------
+    ConfigError
+        A text is no such pair, a key is unknown, or a value is not legal; all findings.
+    """
+    data: dict[str, Any] = {"urdf": urdf}
+    findings: list[Finding] = []
+    for text in settings:
+        key, _, value = text.partition("=")
+        if not key or not value or key == "urdf":
+            findings.append(Finding("--set", 1, "", "KEY=VALUE with a key of a scenario's robot", repr(text)))
+            continue
+        try:
+            data[key] = yaml.safe_load(value)
+        except yaml.YAMLError:
+            findings.append(Finding("--set", 1, key, "a value as in a YAML file", repr(value)))
+    robot = validate(UrdfRobot, data, YamlDocument(Path("--set"), data), (), findings)
+    if robot is None or findings:
+        raise ConfigError(findings)
+    return robot

@@ -1,8 +1,9 @@
-"""Tracked objects: what a map knows of the things that move on it."""
+"""Tracked objects: what a map knows of the things that move on it, and what changes from update to update."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TypeVar
@@ -13,6 +14,9 @@ from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.transform import Transform
 
 Seconds = TypeVar("Seconds", float, FloatArray)
+GONE = "gone"
+MOST_REPORTS = 20
+"""Most changes that one update reports; the next one reports those that are left."""
 
 
 class Motion(str, Enum):
@@ -96,3 +100,24 @@ class TrackedObject:
             "velocity": [self.vx, self.vy],
             "radius": self.radius,
         }
+
+
+class MotionChanges:
+    """Remembers what was last reported of each object; those that only ever stood are not reported."""
+
+    def __init__(self) -> None:
+        self._reported: dict[int, TrackedObject] = {}
+
+    def changes(self, objects: Sequence[TrackedObject]) -> Iterator[dict[str, object]]:
+        """Yield the data of an event for each object that has begun to move, has stopped, is parked or is gone."""
+        left = MOST_REPORTS
+        numbers = {known.number for known in objects}
+        for known in objects:
+            last = self._reported.get(known.number)
+            changed = known.motion is Motion.MOVING if last is None else known.motion is not last.motion
+            if changed and left > 0:
+                self._reported[known.number] = known
+                left -= 1
+                yield known.to_data()
+        for number in [number for number in self._reported if number not in numbers][:left]:
+            yield self._reported.pop(number).to_data() | {"motion": GONE}

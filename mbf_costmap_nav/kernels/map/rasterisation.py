@@ -1,4 +1,4 @@
-"""Rasterisation of polygons: exactly the cells a polygon touches, each once.
+"""Rasterisation of polygons: exactly the cells a polygon touches, each once; and discs by the middles of cells.
 
 A cell is the half-open unit square [ix, ix + 1) x [iy, iy + 1), the same rule by which a point has its cell. A polygon
 covers a cell if the closed polygon and that square share a point: so a corner that lies on the border of two cells
@@ -10,6 +10,7 @@ counted twice.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -159,3 +160,31 @@ def fill_polygon(cells: NDArray[Any], corners: FloatArray, value: int) -> tuple[
             if mask[row, column] != 0:
                 cells[y0 + row, x0 + column] = value
     return x0, y0, x0 + mask.shape[1], y0 + mask.shape[0]
+
+
+UNKNOWN = 255
+
+
+@kernel
+def raise_discs(cells: NDArray[np.uint8], discs: NDArray[np.float64], values: NDArray[np.uint8]) -> None:
+    """Raise the cells whose middle lies in a disc to its value; unknown cells (255) take it, too.
+
+    Parameters
+    ----------
+    cells : (height, width) uint8
+    discs : (n, 3) float64
+        Middle (x, y) and radius in cells; the middle of cell [0, 0] is (0.5, 0.5).
+    values : (n,) uint8
+    """
+    height, width = cells.shape
+    for i in range(len(discs)):
+        x, y, radius = discs[i, 0], discs[i, 1], discs[i, 2]
+        first_row, last_row = max(0, math.floor(y - radius)), min(height - 1, math.floor(y + radius))
+        first_column, last_column = max(0, math.floor(x - radius)), min(width - 1, math.floor(x + radius))
+        for row in range(first_row, last_row + 1):
+            for column in range(first_column, last_column + 1):
+                dx, dy = column + 0.5 - x, row + 0.5 - y
+                if dx * dx + dy * dy > radius * radius:
+                    continue
+                if cells[row, column] < values[i] or cells[row, column] == UNKNOWN:
+                    cells[row, column] = values[i]

@@ -1,7 +1,7 @@
 """Error codes of Nav2 (Kilted) for our outcomes: the same failure, named as clients of Nav2 know it.
 
 Nav2 numbers its failures by action, and its navigators pass on the codes of planners and controllers, as ours do. The
-codes are constants of the result messages of nav2_msgs.
+codes are constants of the result messages of nav2_msgs; 0 is that of a success.
 """
 
 from __future__ import annotations
@@ -17,142 +17,41 @@ from mbf_abstract.outcomes import (
     is_success,
 )
 
-
-class FollowPathCode(IntEnum):
-    """Of FollowPath."""
-
-    NONE = 0
-    UNKNOWN = 100
-    INVALID_CONTROLLER = 101
-    TF_ERROR = 102
-    INVALID_PATH = 103
-    PATIENCE_EXCEEDED = 104
-    FAILED_TO_MAKE_PROGRESS = 105
-    NO_VALID_CONTROL = 106
-    CONTROLLER_TIMED_OUT = 107
-
-
-class PlanningCode(IntEnum):
-    """Of ComputePathToPose."""
-
-    NONE = 0
-    UNKNOWN = 200
-    INVALID_PLANNER = 201
-    TF_ERROR = 202
-    START_OUTSIDE_MAP = 203
-    GOAL_OUTSIDE_MAP = 204
-    START_OCCUPIED = 205
-    GOAL_OCCUPIED = 206
-    TIMEOUT = 207
-    NO_VALID_PATH = 208
-
-
-class ThroughPosesCode(IntEnum):
-    """Of ComputePathThroughPoses."""
-
-    NONE = 0
-    UNKNOWN = 300
-    INVALID_PLANNER = 301
-    TF_ERROR = 302
-    START_OUTSIDE_MAP = 303
-    GOAL_OUTSIDE_MAP = 304
-    START_OCCUPIED = 305
-    GOAL_OCCUPIED = 306
-    TIMEOUT = 307
-    NO_VALID_PATH = 308
-    NO_VIAPOINTS_GIVEN = 309
-
-
-class SmoothingCode(IntEnum):
-    """Of SmoothPath."""
-
-    NONE = 0
-    UNKNOWN = 500
-    INVALID_SMOOTHER = 501
-    TIMEOUT = 502
-    SMOOTHED_PATH_IN_COLLISION = 503
-    FAILED_TO_SMOOTH_PATH = 504
-    INVALID_PATH = 505
-
-
-class WaypointsCode(IntEnum):
-    """Of FollowWaypoints."""
-
-    NONE = 0
-    UNKNOWN = 600
-    TASK_EXECUTOR_FAILED = 601
-    NO_VALID_WAYPOINTS = 602
-    STOP_ON_MISSED_WAYPOINT = 603
-
-
-class SpinCode(IntEnum):
-    """Of Spin."""
-
-    NONE = 0
-    UNKNOWN = 700
-    TIMEOUT = 701
-    TF_ERROR = 702
-    COLLISION_AHEAD = 703
-
-
-class BackUpCode(IntEnum):
-    """Of BackUp."""
-
-    NONE = 0
-    UNKNOWN = 710
-    TIMEOUT = 711
-    TF_ERROR = 712
-    INVALID_INPUT = 713
-    COLLISION_AHEAD = 714
-
-
-class DriveOnHeadingCode(IntEnum):
-    """Of DriveOnHeading."""
-
-    NONE = 0
-    UNKNOWN = 720
-    TIMEOUT = 721
-    TF_ERROR = 722
-    COLLISION_AHEAD = 723
-    INVALID_INPUT = 724
-
-
-class WaitCode(IntEnum):
-    """Of Wait."""
-
-    NONE = 0
-    UNKNOWN = 740
-    TIMEOUT = 741
-
-
-class NavigateCode(IntEnum):
-    """Of NavigateToPose."""
-
-    NONE = 0
-    UNKNOWN = 9000
-    FAILED_TO_LOAD_BEHAVIOR_TREE = 9001
-    TF_ERROR = 9002
-    TIMEOUT = 9003
-
-
-class NavigateThroughPosesCode(IntEnum):
-    """Of NavigateThroughPoses."""
-
-    NONE = 0
-    UNKNOWN = 9100
-    FAILED_TO_LOAD_BEHAVIOR_TREE = 9101
-    TF_ERROR = 9102
-    TIMEOUT = 9103
-
-
-class WaypointState(IntEnum):
-    """Of nav2_msgs/WaypointStatus."""
-
-    PENDING = 0
-    COMPLETED = 1
-    SKIPPED = 2
-    FAILED = 3
-
+FollowPathCode = IntEnum(
+    "FollowPathCode",
+    "UNKNOWN INVALID_CONTROLLER TF_ERROR INVALID_PATH PATIENCE_EXCEEDED "
+    "FAILED_TO_MAKE_PROGRESS NO_VALID_CONTROL CONTROLLER_TIMED_OUT",
+    start=100,
+)
+PlanningCode = IntEnum(
+    "PlanningCode",
+    "UNKNOWN INVALID_PLANNER TF_ERROR START_OUTSIDE_MAP GOAL_OUTSIDE_MAP "
+    "START_OCCUPIED GOAL_OCCUPIED TIMEOUT NO_VALID_PATH",
+    start=200,
+)
+ThroughPosesCode = IntEnum(
+    "ThroughPosesCode",
+    "UNKNOWN INVALID_PLANNER TF_ERROR START_OUTSIDE_MAP GOAL_OUTSIDE_MAP "
+    "START_OCCUPIED GOAL_OCCUPIED TIMEOUT NO_VALID_PATH NO_VIAPOINTS_GIVEN",
+    start=300,
+)
+SmoothingCode = IntEnum(
+    "SmoothingCode",
+    "UNKNOWN INVALID_SMOOTHER TIMEOUT SMOOTHED_PATH_IN_COLLISION FAILED_TO_SMOOTH_PATH INVALID_PATH",
+    start=500,
+)
+WaypointsCode = IntEnum(
+    "WaypointsCode", "UNKNOWN TASK_EXECUTOR_FAILED NO_VALID_WAYPOINTS STOP_ON_MISSED_WAYPOINT", start=600
+)
+SpinCode = IntEnum("SpinCode", "UNKNOWN TIMEOUT TF_ERROR COLLISION_AHEAD", start=700)
+BackUpCode = IntEnum("BackUpCode", "UNKNOWN TIMEOUT TF_ERROR INVALID_INPUT COLLISION_AHEAD", start=710)
+DriveOnHeadingCode = IntEnum("DriveOnHeadingCode", "UNKNOWN TIMEOUT TF_ERROR COLLISION_AHEAD INVALID_INPUT", start=720)
+WaitCode = IntEnum("WaitCode", "UNKNOWN TIMEOUT", start=740)
+NavigateCode = IntEnum("NavigateCode", "UNKNOWN FAILED_TO_LOAD_BEHAVIOR_TREE TF_ERROR TIMEOUT", start=9000)
+NavigateThroughPosesCode = IntEnum(
+    "NavigateThroughPosesCode", "UNKNOWN FAILED_TO_LOAD_BEHAVIOR_TREE TF_ERROR TIMEOUT", start=9100
+)
+WaypointState = IntEnum("WaypointState", "PENDING COMPLETED SKIPPED FAILED", start=0)
 
 PLANNING: dict[int, PlanningCode] = {
     GetPathOutcome.INVALID_PLUGIN: PlanningCode.INVALID_PLANNER,

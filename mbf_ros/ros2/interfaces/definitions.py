@@ -52,7 +52,10 @@ CONSTANTS: dict[str, tuple[str, Mapping[str, int]]] = {
     "mbf_msgs/action/MoveBase_Result": ("uint32", _of_enum(MoveBaseOutcome)),
     **{f"mbf_msgs/srv/{name}_Request": ("uint8", COSTMAPS) for name in QUESTIONS},
     **{f"mbf_msgs/srv/{name}_Response": ("uint8", _of_enum(CellState)) for name in QUESTIONS},
-    **{f"nav2_msgs/action/{name}_Result": ("uint16", _of_enum(codes)) for name, codes in NAV2_CODES.items()},
+    **{
+        f"nav2_msgs/action/{name}_Result": ("uint16", {"NONE": 0, **_of_enum(codes)})
+        for name, codes in NAV2_CODES.items()
+    },
     "nav2_msgs/msg/WaypointStatus": ("uint8", _of_enum(nav2_codes.WaypointState)),
 }
 """Type and values of the constants of a part, by its name."""

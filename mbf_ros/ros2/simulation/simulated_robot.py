@@ -13,16 +13,16 @@ from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
+from mbf_abstract.event_values import error_text
 from mbf_abstract.geometry import Command, Pose
 from mbf_abstract.session import NavigationSession
-from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.clock import Clock, WallClock
 from mbf_ros.messages.geometry import InvalidValueError, MessageContext, pose_stamped, twist_of
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.robot_inputs import INITIAL_POSE_TYPE, RobotInputs
 from mbf_ros.robot_messages import SENSOR_TOPICS, STATE_TOPICS, TF, TF_STATIC, RobotMessages, state_topics
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
-from mbf_ros.ros2.running import Spinner, require_ros_2, ros_2
-from mbf_ros.ros2.simulation.newest_command import NewestCommand
+from mbf_ros.ros2.running import RosError, Spinner, require_ros_2, ros_2
 from mbf_ros.ros2.topics import Inputs
 
 NODE = "simulator"
@@ -149,3 +149,49 @@ class SimulatedRobot:
 def _name(topic: str) -> str:
     """The name under which a topic is published; those of sensors can be put into a namespace."""
     return topic if topic in (TF, TF_STATIC, CLOCK) else topic.removeprefix("/")
+
+
+class NewestCommand:
+    """One command, or why none will come any more.
+
+    Parameters
+    ----------
+    real_time : Clock
+        On which is waited.
+    """
+
+    def __init__(self, real_time: Clock) -> None:
+        self._condition = real_time.condition()
+        self._command: Command | None = None
+        self._failure: BaseException | None = None
+
+    def put(self, command: Command) -> None:
+        """Replace the command."""
+        with self._condition:
+            self._command = command
+            self._condition.notify_all()
+
+    def fail(self, error: BaseException) -> None:
+        """Let no more commands come, because of a fault of ours; who waits for one goes on at once."""
+        with self._condition:
+            self._failure = error
+            self._condition.notify_all()
+
+    def check(self) -> None:
+        """Raise RosError if no more commands will come."""
+        if self._failure is not None:
+            raise RosError(f"{type(self._failure).__name__}: {error_text(self._failure)}") from self._failure
+
+    def take(self) -> Command | None:
+        """Return the command if one has come since the last call."""
+        with self._condition:
+            command, self._command = self._command, None
+            return command
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for a command, at most ``seconds`` [s]; returns whether there is one. Raises RosError as ``check``."""
+        with self._condition:
+            if self._command is None and self._failure is None:
+                self._condition.wait(seconds)
+            self.check()
+            return self._command is not None

@@ -39,8 +39,7 @@ def table1(
         from terrain.experiments.table1.environments.world import load_world
         from terrain.experiments.table1.experiment import ChecksFailed, run_experiment, tracks
         from terrain.experiments.table1.picture import draw_tracks
-        from terrain.experiments.table1.report import show
-        from terrain.experiments.table1.result_file import write_result
+        from terrain.experiments.table1.report import show, write_result
         from terrain.sweeps.command import parse_seeds
 
         chosen, console = parse_seeds(seeds), Console()

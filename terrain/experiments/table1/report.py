@@ -1,12 +1,20 @@
-"""The tables of the experiment, as text for a terminal and for the documentation."""
+"""The result of the experiment: its tables, as text for a terminal and for the documentation, and its file.
+
+The file is JSON that every reader takes, in which there is no NaN and no Infinity.
+"""
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from rich.console import Group
 from rich.table import Table
+
+from mbf_abstract.whole_files import write_whole
 
 PAPER = {
     "planner calls": (1195, 290),
@@ -103,3 +111,18 @@ def criteria_table(result: Mapping[str, Any]) -> Table:
 
 def _plain_ratio(a: float, b: float) -> str:
     return f"{a / b:.2f}" if b else "-"
+
+
+def write_result(file: Path, result: Mapping[str, Any]) -> None:
+    """Write a file whole. What is undefined (nan) becomes null, what is infinite the text ``inf`` or ``-inf``."""
+    write_whole(file, json.dumps(_plain(result), indent=1, allow_nan=False) + "\n")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return value

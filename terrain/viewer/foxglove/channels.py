@@ -14,9 +14,9 @@ from mcap_protobuf.schema import build_file_descriptor_set
 
 from mbf_abstract.access.visitor import Visitor
 from terrain.viewer.foxglove.protocol import ProtocolError, message_data, server_time
+from terrain.viewer.logs.event_messages import Stamped
 from terrain.viewer.logs.foxglove_messages import nanoseconds
 from terrain.viewer.logs.run_messages import TOPICS, bytes_of, json_schema
-from terrain.viewer.logs.stamped import Stamped
 
 NUMBERS = {topic: number for number, topic in enumerate(TOPICS, 1)}
 HISTORY = 1000

@@ -1,9 +1,12 @@
-"""Events of a run as messages: for the log, as they are in events.jsonl, and as the state of every action."""
+"""Messages of a run before they are made; those of its events.
+
+Events are lines of the log, as they are in events.jsonl, and change the state of an action.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +17,28 @@ from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.viewer.logs import foxglove_messages as message
 from terrain.viewer.reports.event_lines import NOTABLE, event_text
 from terrain.viewer.reports.timeline import ACTIONS
+
+
+@dataclass(frozen=True, eq=False)
+class Stamped:
+    """A message that has not been made yet: much of a live run is looked at by nobody.
+
+    Attributes
+    ----------
+    time : float
+        [s] of the run.
+    make : callable
+        Returns the protobuf message or the ``JsonMessage``.
+    part : str, optional
+        Which part of the present state it shows, so that one who comes later needs the newest message of each part;
+        None of messages that only matter at their time.
+    """
+
+    time: float
+    topic: str
+    make: Callable[[], Any]
+    part: str | None = None
+
 
 ERRORS = {EventKind.FAULT, EventKind.QUARANTINE, EventKind.SINK_FAILED}
 DETAILS = {EventKind.STATE_CHANGED, EventKind.PLUGIN_CALL_STARTED, EventKind.PLUGIN_CALL_ENDED}

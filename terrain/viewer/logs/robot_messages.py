@@ -20,8 +20,7 @@ from terrain.recording.recorded_robot import RobotReports
 from terrain.recording.recording import Recording
 from terrain.viewer.logs import foxglove_messages as message
 from terrain.viewer.logs import foxglove_scene as scene
-from terrain.viewer.logs.event_messages import JsonMessage
-from terrain.viewer.logs.stamped import Stamped
+from terrain.viewer.logs.event_messages import JsonMessage, Stamped
 
 ESTIMATED, ODOM, BODY = "base_link_estimated", "odom", "base_link"
 ODOMETRY = "mbf.Odometry"

@@ -48,11 +48,10 @@ from terrain.recording.metrics import cross_track_errors
 from terrain.recording.recording import Recording, StampedPoints
 from terrain.viewer.logs import foxglove_messages as message
 from terrain.viewer.logs import foxglove_scene as scene
-from terrain.viewer.logs.event_messages import ActionStates, JsonMessage, event_message, log_message
+from terrain.viewer.logs.event_messages import ActionStates, JsonMessage, Stamped, event_message, log_message
 from terrain.viewer.logs.foxglove_mesh_costs import MeshCosts
 from terrain.viewer.logs.moving_frames import MovingFrames, Track
 from terrain.viewer.logs.robot_messages import RobotMessages, scan_messages
-from terrain.viewer.logs.stamped import Stamped
 from terrain.viewer.reports.timeline import ACTIONS
 
 MAX_PIECES = 2000  # of the track, some three hours of driving; then the oldest are replaced

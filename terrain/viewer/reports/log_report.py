@@ -9,8 +9,8 @@ from mbf_abstract.drive_log import DriveLog, LogReport
 from mbf_abstract.event_values import error_text
 from mbf_abstract.whole_files import write_whole
 from terrain.recording.drive_logs import recording_of
-from terrain.viewer.pictures.map_picture import map_png
 from terrain.viewer.pictures.picture import ViewerMissing
+from terrain.viewer.pictures.plan_picture import map_png
 from terrain.viewer.reports.page import image, page, table
 
 PICTURES = "map_*.png"

@@ -5,7 +5,7 @@ import pytest
 from mbf_abstract.geometry import Twist
 from mbf_abstract.time.sim_clock import SimClock
 from mbf_ros.ros2.running import RosError
-from mbf_ros.ros2.simulation.newest_command import NewestCommand
+from mbf_ros.ros2.simulation.simulated_robot import NewestCommand
 
 
 def test_a_command_is_waited_for_and_taken_once():

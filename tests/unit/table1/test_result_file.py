@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from terrain.experiments.table1.result_file import write_result
+from terrain.experiments.table1.report import write_result
 
 RESULTS = sorted((Path(__file__).resolve().parents[3] / "docs" / "results").glob("table1_*.json"))
 

@@ -7,8 +7,7 @@ import pytest
 from mbf_abstract.geometry import Path
 from mbf_abstract.maps.tracking.blocking import blockages
 from mbf_abstract.maps.tracking.contact import RobotBox
-from mbf_abstract.maps.tracking.motion_changes import MOST_REPORTS, MotionChanges
-from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
+from mbf_abstract.maps.tracking.objects import MOST_REPORTS, Motion, MotionChanges, TrackedObject
 
 DISC = RobotBox.disc(0.3)
 STRAIGHT = Path.from_points([(0.1 * step, 0.0, 0.0) for step in range(81)])

@@ -15,7 +15,7 @@ from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingArou
 from mbf_abstract.maps.tracking.blocking import blockages
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
-from mbf_costmap_nav.kernels.map.discs import raise_discs
+from mbf_costmap_nav.kernels.map.rasterisation import raise_discs
 from mbf_costmap_nav.map.static_maps import StaticMaps
 
 

@@ -35,7 +35,7 @@ def table1_main(
         from terrain.experiments.table1.main_run import table
         from terrain.experiments.table1.main_run.picture import draw_curves
         from terrain.experiments.table1.main_run.run import known_rows, run_missing, trials
-        from terrain.experiments.table1.result_file import write_result
+        from terrain.experiments.table1.report import write_result
         from terrain.sweeps.command import parse_seeds
 
         console = Console()

@@ -9,9 +9,8 @@ import pytest
 from mbf_abstract.access.page_access import Role
 from terrain.viewer.foxglove.channels import HISTORY, NUMBERS, WAITING, Channels, FoxgloveClient
 from terrain.viewer.logs import run_messages
-from terrain.viewer.logs.event_messages import JsonMessage
+from terrain.viewer.logs.event_messages import JsonMessage, Stamped
 from terrain.viewer.logs.run_messages import TOPICS, RunMessages
-from terrain.viewer.logs.stamped import Stamped
 
 
 def client_of(channels, *topics):

@@ -1,11 +1,17 @@
-"""Critics along the path: the distance from it, the heading towards it, and the progress on it."""
+"""Critics of the path, of the goal and of the motion itself.
+
+Along the path: the distance from it, the heading towards it, and the progress on it. Near the goal: the distance to it,
+and its heading. Of the motion: driving against the direction of travel, and turning.
+"""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from mbf_costmap_nav.critics.rollouts import Float32Array, Rollouts
-from mbf_costmap_nav.kernels.control.critics import alignment, mean_angle_to
+from mbf_costmap_nav.kernels.control.critics import alignment, mean_angle_to, mean_distance_to_point, mean_of
 
 ACTIVE_BEYOND = 0.5
 """Length [m] left on the path below which the goal critics take over."""
@@ -15,6 +21,10 @@ STRIDE = 6
 """Every how many steps trajectory and path are compared."""
 AHEAD = 5
 """How many path points beyond the furthest reached one the target of the progress lies."""
+GOAL_WITHIN = 1.4
+"""Length [m] left on the path below which the distance to the goal counts."""
+CAR_WITHIN = 1.0
+"""Length [m] left on the path below which a car is scored by its final heading."""
 
 
 def path_align(rollouts: Rollouts) -> Float32Array | None:
@@ -58,3 +68,34 @@ def path_follow(rollouts: Rollouts) -> Float32Array | None:
     free_beyond = np.flatnonzero(rollouts.path_free[index:])
     target = rollouts.path[index + (free_beyond[0] if free_beyond.size else 0)]
     return np.asarray(np.hypot(rollouts.poses[0, -1] - target[0], rollouts.poses[1, -1] - target[1]))
+
+
+def prefer_forward(rollouts: Rollouts) -> Float32Array:
+    """Prefer driving forward, where the sensors look: mean backward speed [m/s]; the forward one on a reverse path."""
+    forward = rollouts.velocities[0]
+    return mean_of(-forward if rollouts.backward else forward, True)
+
+
+def twirling(rollouts: Rollouts) -> Float32Array:
+    """Keep an omnidirectional robot from turning for no reason: mean yaw rate [rad/s]."""
+    return mean_of(rollouts.velocities[2], False)
+
+
+def goal(rollouts: Rollouts) -> Float32Array | None:
+    """Attract to the goal: mean distance [m] of the trajectory to it."""
+    if not rollouts.near_goal(GOAL_WITHIN):
+        return None
+    return mean_distance_to_point(rollouts.poses, rollouts.goal[0], rollouts.goal[1])
+
+
+def goal_angle(rollouts: Rollouts) -> Float32Array | None:
+    """Turn to the goal's heading within the tolerance of its position: mean angle [rad].
+
+    A car cannot turn there, so near the goal it is scored by its final heading.
+    """
+    if not rollouts.on_last_section:
+        return None
+    if rollouts.turning_radius > 0.0 and rollouts.near_goal(CAR_WITHIN):
+        return mean_angle_to(rollouts.poses[:, -1:], rollouts.goal[2])
+    near = math.hypot(rollouts.goal[0], rollouts.goal[1]) <= rollouts.goal_tolerance
+    return mean_angle_to(rollouts.poses, rollouts.goal[2]) if near else None
