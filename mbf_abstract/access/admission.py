@@ -10,11 +10,15 @@ from typing import Any
 from mbf_abstract.access.page_access import PageAccess
 
 MOST_REFUSALS = 20  # that are reported
-SECURITY_HEADERS = {
+PRIVATE_HEADERS = {
     "Referrer-Policy": "no-referrer",  # the token is in the address
     "Cache-Control": "no-store",
     "X-Frame-Options": "DENY",
     "X-Content-Type-Options": "nosniff",
+}
+"""Of every page that is served."""
+SECURITY_HEADERS = {
+    **PRIVATE_HEADERS,
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; "
     "connect-src 'self' ws: wss:",
 }

@@ -9,6 +9,8 @@ from __future__ import annotations
 import asyncio
 from collections import OrderedDict, deque
 from collections.abc import Hashable
+from contextlib import suppress
+from typing import Any
 
 Frame = str | bytes
 """A text or a binary frame of a WebSocket."""
@@ -91,3 +93,14 @@ class Outbox(WaitingFrames):
             self._ready.clear()
             await self._ready.wait()
         return self.pop()
+
+    async def send_to(self, connection: Any) -> None:
+        """Send what comes until the connection is closed.
+
+        ``send`` waits for a client that reads slowly, and nobody waits for ``send``.
+        """
+        from websockets.exceptions import ConnectionClosed
+
+        with suppress(ConnectionClosed):
+            while True:
+                await connection.send(await self.take())

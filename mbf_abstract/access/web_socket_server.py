@@ -181,7 +181,7 @@ class WebSocketServer(Generic[AnyVisitor]):
             await connection.close(TRY_AGAIN_LATER, "too many clients")
             return
         client = self._welcome(connection)
-        sending = asyncio.create_task(self._send(client, connection))
+        sending = asyncio.create_task(client.outbox.send_to(connection))
         authenticating = asyncio.create_task(self._await_token(client))
         try:
             async for frame in connection:
@@ -211,17 +211,6 @@ class WebSocketServer(Generic[AnyVisitor]):
         self._visitors.add(client)
         self._events.emit(EventKind.CUSTOM, self._offer.name, message="client connected", client=client.name)
         return client
-
-    @staticmethod
-    async def _send(client: Visitor, connection: Any) -> None:
-        """Send what is in the outbox; ``send`` waits for a client that reads slowly, and nobody waits for ``send``."""
-        from websockets.exceptions import ConnectionClosed
-
-        try:
-            while True:
-                await connection.send(await client.outbox.take())
-        except ConnectionClosed:
-            return
 
     @staticmethod
     async def _await_token(client: Visitor) -> None:

@@ -25,7 +25,8 @@ from terrain.physics.incidents import IncidentKind
 from terrain.recording.verdict import Verdict, judge
 from terrain.scenarios.limits import broken_limits
 from terrain.scenarios.scenario import Scenario
-from terrain.session.arrival import Arrival, arrival_tolerance
+from terrain.session.arrival import Arrival
+from terrain.session.robot_run import judged_numbers
 from terrain.session.session import Session, SessionOptions
 
 OWNER = "environment"  # of the lease of the velocity gate
@@ -218,14 +219,8 @@ class Episode:
 
     def _metrics(self) -> Mapping[str, object]:
         """What the judge looks at, as it stands in ``metrics.json`` of a run."""
-        simulation, scenario = self.session.simulation, self.session.scenario
-        counts = simulation.monitor.counts
         return {
-            "arrivals": [arrival.to_json() for arrival in self._arrivals],
-            "arrival_tolerance": arrival_tolerance(scenario.limits, scenario.localization, self._runtime.parameters),
-            "incidents": sorted({incident.kind.value for incident in simulation.incidents}),
-            "collisions_while_moving": counts[IncidentKind.COLLISION_WHILE_MOVING],
-            "tip_overs": counts[IncidentKind.TIPPED_OVER],
+            **judged_numbers(self.session, self._arrivals),
             "max_tilt_deg": round(math.degrees(self._max_tilt), 6),
             "path_length_m": round(self._driven, 6),
         }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -12,6 +12,7 @@ from scipy import ndimage
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.physics.contact_depth import depth_in_cells, placed
 from terrain.physics.motion_sample import Thing
+from terrain.physics.protocols import SimulatedWorld
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 from terrain.worlds.surface import Surface, joined, level_rectangle
@@ -29,7 +30,7 @@ class MovingRobot(Protocol):
         """Move on by one small time step."""
 
 
-class KinematicWorld:
+class KinematicWorld(SimulatedWorld):
     """Ground and walls without physics; has the clock and the interface that ``Simulation`` steps.
 
     Parameters
@@ -40,53 +41,24 @@ class KinematicWorld:
         Its occupied cells are walls.
     """
 
-    time_step = TIME_STEP
-
     def __init__(self, terrain: Heightfield | None = None, building: OccupancyGrid | None = None) -> None:
+        super().__init__(TIME_STEP)
         self.terrain = terrain
         self.building = building
         self.robots: list[MovingRobot] = []
         self.solids: list[UprightSolid] = []
-        self.things: dict[int, Thing] = {}
-        self.step_count = 0
-        self._before_step: list[Callable[[], None]] = []
-        self._after_step: list[Callable[[], None]] = []
         self._clearance: FloatArray | None = None
         if building is not None:
             distance = ndimage.distance_transform_edt(~building.occupied)
             self._clearance = np.asarray(distance, dtype=float) * building.resolution
 
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        return self.step_count * TIME_STEP
-
-    def step(self) -> None:
-        """Advance by one time step."""
-        for callback in self._before_step:
-            callback()
-        self.step_count += 1
-        for robot in self.robots:
-            robot.advance(TIME_STEP)
-        for callback in self._after_step:
-            callback()
-
-    def before_step(self, callback: Callable[[], None]) -> None:
-        """Call ``callback`` before each step: moving actors, faults."""
-        self._before_step.append(callback)
-
-    def after_step(self, callback: Callable[[], None]) -> None:
-        """Call ``callback`` after each step: monitors and sensors."""
-        self._after_step.append(callback)
-
     def close(self) -> None:
         """Do nothing; there is nothing to free."""
 
-    def __enter__(self) -> KinematicWorld:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
+    def _move_on(self) -> None:
+        self.step_count += 1
+        for robot in self.robots:
+            robot.advance(TIME_STEP)
 
     def add_box(self, pose: Pose, size: Sequence[float], moving: bool = False) -> int:
         """Stand a box of ``size`` (3,) [m] with its middle at ``pose``; ``moving`` if it will be moved."""

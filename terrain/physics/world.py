@@ -14,7 +14,7 @@ at the triangles (``terrain.sensors.rays``).
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.physics.bullet import connect, quiet_native_output
-from terrain.physics.motion_sample import Thing
+from terrain.physics.protocols import SimulatedWorld
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 from terrain.worlds.surface import Surface, box, cylinder, joined, level_rectangle
@@ -39,7 +39,7 @@ EVERY_GROUP = RAY | STATIC | ROBOT | MOVING
 ORIGIN = Pose((0.0, 0.0, 0.0))
 
 
-class BulletWorld:
+class BulletWorld(SimulatedWorld):
     """A world of its own: several can live in one process. Use as a context manager or call ``close``.
 
     Parameters
@@ -51,32 +51,18 @@ class BulletWorld:
     ----------
     bullet : pybullet_utils.bullet_client.BulletClient
         The functions of PyBullet, for this world.
-    step_count : int
-        Steps since the clock was started (see ``restart_clock``); ``time`` is derived from it and thus exact.
     ground_bodies : set of int
         Bodies that are there to be driven on; touching any other counts as a collision.
-    things : dict of int to Thing
-        Kinds of bodies that are not fixed, to distinguish collisions.
     """
 
     def __init__(self, time_step: float = TIME_STEP) -> None:
-        self.time_step = time_step
+        super().__init__(time_step)
         self.bullet = connect(time_step)
-        self.step_count = 0
         self.ground_bodies: set[int] = set()
-        self.things: dict[int, Thing] = {}
         self.has_moving_bodies = False
         self._static: list[Surface] = []
         self._folder = tempfile.TemporaryDirectory(prefix="mbf_world_")
-        self._before_step: list[Callable[[], None]] = []
-        self._after_step: list[Callable[[], None]] = []
         self._closed = False
-
-    def __enter__(self) -> BulletWorld:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Free the world; idempotent."""
@@ -85,31 +71,13 @@ class BulletWorld:
             self.bullet.disconnect()
             self._folder.cleanup()
 
-    @property
-    def time(self) -> float:
-        """Simulated time [s] since the clock was started."""
-        return self.step_count * self.time_step
-
     def restart_clock(self) -> None:
         """Let this instant be time 0; called once the robots have settled."""
         self.step_count = 0
 
-    def before_step(self, callback: Callable[[], None]) -> None:
-        """Call ``callback`` before each step: moving actors, motor watchdogs."""
-        self._before_step.append(callback)
-
-    def after_step(self, callback: Callable[[], None]) -> None:
-        """Call ``callback`` after each step: monitors and sensors."""
-        self._after_step.append(callback)
-
-    def step(self) -> None:
-        """Advance by one time step."""
-        for callback in self._before_step:
-            callback()
+    def _move_on(self) -> None:
         self.bullet.stepSimulation()
         self.step_count += 1
-        for callback in self._after_step:
-            callback()
 
     def add_heightfield(self, terrain: Heightfield) -> int:
         """Put a terrain in as Bullet's own heightfield.

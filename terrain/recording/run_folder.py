@@ -29,6 +29,7 @@ RESULTS = (
     "provenance.yaml",
 )
 PARTS = "recording.parts"
+ROWS = ("times", "poses", "twists", "commands", "scan_origins")
 PERIOD = 2.0  # s of the run in one part; to write one takes about a millisecond
 
 
@@ -122,21 +123,14 @@ def read_parts(folder: Path) -> Recording:
     if not parts:
         raise RecordingError(f"{folder / PARTS}: holds no part of a recording")
     try:
+        whole: dict[str, Any] = {name: _rows(parts, name) for name in ROWS}
+        whole |= {name: _joined(parts, name) for name in ("paths", "scans", "grids", "layers", "objects")}
         return replace(
             parts[0],
-            times=_rows(parts, "times"),
-            poses=_rows(parts, "poses"),
-            twists=_rows(parts, "twists"),
-            commands=_rows(parts, "commands"),
+            **whole,
             goals=parts[-1].goals,
-            paths=_joined(parts, "paths"),
-            scans=_joined(parts, "scans"),
-            scan_origins=_rows(parts, "scan_origins"),
             events=tuple(_joined(parts, "events")),
-            grids=_joined(parts, "grids"),
             meshes=_with_surface(_joined(parts, "meshes")),
-            layers=_joined(parts, "layers"),
-            objects=_joined(parts, "objects"),
             reports=joined_reports([part.reports for part in parts]),
             actors=[
                 replace(track, poses=np.concatenate([part.actors[number].poses for part in parts]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +26,7 @@ from terrain.recording.verdict import judge
 from terrain.scenarios.scenario import Scenario
 from terrain.scenarios.settings import apply_world_settings
 from terrain.scenarios.world import ScenarioWorld
-from terrain.session.arrival import arrival_tolerance
+from terrain.session.arrival import Arrival, arrival_tolerance
 from terrain.session.executives import make_executive
 from terrain.session.goal_sequence import NO_GOALS, GoalSequence
 from terrain.session.robot_fit import notes_on_fit
@@ -164,21 +164,30 @@ def record_provenance(scenario: Scenario, sessions: Mapping[str, Session], optio
 
 def _measure(recording: Recording, session: Session, sequence: GoalSequence) -> Metrics:
     """Return the numbers of a run: those of its recording, and those that only its simulation knows."""
-    metrics = measure(recording).to_json()
-    metrics["incidents"] = sorted({incident.kind.value for incident in session.simulation.incidents})
-    counts = session.simulation.monitor.counts
-    metrics["collisions"] = counts[IncidentKind.COLLISION]
-    metrics["collisions_while_moving"] = counts[IncidentKind.COLLISION_WHILE_MOVING]
-    metrics["arrivals"] = [arrival.to_json() for arrival in sequence.arrivals]
-    metrics["arrival_tolerance"] = arrival_tolerance(
-        session.scenario.limits, session.scenario.localization, session.navigator.server.runtime.parameters
-    )
-    metrics["tip_overs"] = counts[IncidentKind.TIPPED_OVER]
-    metrics["near_misses"] = counts[IncidentKind.NEAR_MISS]
-    metrics["energy_j"] = round(session.simulation.monitor.energy, 3)
-    metrics["slipped_m"] = round(session.simulation.monitor.slipped, 6)
-    metrics["seed"], metrics["digest"] = session.seed, session.digest.hexdigest()
-    return metrics
+    monitor = session.simulation.monitor
+    return {
+        **measure(recording).to_json(),
+        **judged_numbers(session, sequence.arrivals),
+        "near_misses": monitor.counts[IncidentKind.NEAR_MISS],
+        "energy_j": round(monitor.energy, 3),
+        "slipped_m": round(monitor.slipped, 6),
+        "seed": session.seed,
+        "digest": session.digest.hexdigest(),
+    }
+
+
+def judged_numbers(session: Session, arrivals: Sequence[Arrival]) -> Metrics:
+    """Return those numbers of a run that only its simulation knows and that its verdict looks at."""
+    counts, scenario = session.simulation.monitor.counts, session.scenario
+    parameters = session.navigator.server.runtime.parameters
+    return {
+        "incidents": sorted({incident.kind.value for incident in session.simulation.incidents}),
+        "collisions": counts[IncidentKind.COLLISION],
+        "collisions_while_moving": counts[IncidentKind.COLLISION_WHILE_MOVING],
+        "arrivals": [arrival.to_json() for arrival in arrivals],
+        "arrival_tolerance": arrival_tolerance(scenario.limits, scenario.localization, parameters),
+        "tip_overs": counts[IncidentKind.TIPPED_OVER],
+    }
 
 
 def write_numbers(folder: Path, metrics: Metrics, timing: Metrics) -> None:

@@ -43,22 +43,13 @@ LEAST_HOLD = 2.0  # s that a scan is shown
 
 
 def add_surroundings(scene: Scene, recording: Recording) -> None:
-    """Add what does not move apart from the ground."""
-    add_solids(scene, recording)
-    add_marks(scene, recording, pin_height(recording))
-
-
-def add_solids(scene: Scene, recording: Recording) -> None:
-    """Add light, walls and obstacles."""
+    """Add what does not move apart from the ground: light, walls and obstacles, and pins at start and goals."""
     scene.set_up_direction("+z")
     _add_light(scene)
     for name, surface, colour in standing_things(recording):
         _add_solid(scene, f"/{name}", surface, colour)
-
-
-def add_marks(scene: Scene, recording: Recording, height: float, robot: str = "") -> None:
-    """Add pins at start and goals, with the robot's name where there are several."""
-    for name, pose, colour in marks(recording, robot):
+    height = pin_height(recording)
+    for name, pose, colour in marks(recording):
         add_pin(scene, f"/{name}", pose, colour, name, height)
 
 
@@ -108,9 +99,9 @@ def add_path(scene: Scene, name: str, points: FloatArray, colour: Colour = PLANN
     return scene.add_line_segments(name, segments, colour, thickness=LINE_WIDTH, thickness_units="screen")
 
 
-def add_track_piece(scene: Scene, name: str, points: FloatArray, colour: Colour = DRIVEN) -> Any:
+def add_track_piece(scene: Scene, name: str, points: FloatArray) -> Any:
     """Add a piece of the driven track, a little above plans, so that it covers them."""
-    return add_path(scene, name, points + np.array([0.0, 0.0, LINE_LIFT]), colour)
+    return add_path(scene, name, points + np.array([0.0, 0.0, LINE_LIFT]), DRIVEN)
 
 
 def add_scan(scene: Scene, name: str, points: FloatArray) -> Any:

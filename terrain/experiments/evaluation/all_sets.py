@@ -13,9 +13,11 @@ from rich.console import Console
 from mbf_abstract.whole_files import write_whole
 from terrain.commands.counted import counted
 from terrain.experiments.evaluation.bench import Asked, Judged, drive, entries_of, show
-from terrain.experiments.evaluation.leaderboard import failures_text
+from terrain.experiments.evaluation.leaderboard import page_line
 from terrain.experiments.evaluation.protocol import Protocol
 from terrain.sweeps.html_tables import html_page, html_table
+
+SHOWN = ("", "rank", "entry", "arrived", "SPL", "time [s]", "contacts", "failures")
 
 
 def bench_all(protocols: Sequence[Protocol], asked: Asked) -> None:
@@ -46,16 +48,5 @@ def overview(sets: Sequence[Judged], command: str) -> str:
 
 
 def _lines(judged: Judged) -> list[dict[str, object]]:
-    return [
-        {
-            "": "▶" if line.entry in judged.own else "",
-            "rank": "" if line.rank is None else line.rank,
-            "entry": line.entry,
-            "arrived": f"{line.arrived} of {line.with_route}",
-            "SPL": round(line.spl, 3),
-            "time [s]": "" if line.time_s is None else line.time_s,
-            "contacts": "" if line.contacts is None else line.contacts,
-            "failures": failures_text(line),
-        }
-        for line in judged.lines
-    ]
+    whole = [page_line(line, line.entry in judged.own, {"contacts": "contacts"}) for line in judged.lines]
+    return [{name: line[name] for name in SHOWN} for line in whole]

@@ -185,7 +185,7 @@ def page(
         The figure of difficulty curves as SVG; empty for none.
     """
     parts = [f"<p>{html.escape(text)}</p>" for text in about]
-    parts += [html_table([_page_line(line, line.entry in entrants, _counts(lines)) for line in lines])]
+    parts += [html_table([page_line(line, line.entry in entrants, _counts(lines)) for line in lines])]
     parts += ["<h2>Arrived, by world</h2>", curves, html_table(_by_world(rows, lines))]
     settings = [
         {"entry": line.entry, "map": entries[line.entry]["backend"], "settings": settings_text(entries[line.entry])}
@@ -203,7 +203,8 @@ def settings_text(entry: Mapping[str, Any]) -> str:
     return " ".join(f"{key}={value}" for key, value in sorted(entry["settings"].items()))
 
 
-def _page_line(line: Standing, is_entrant: bool, counts: Mapping[str, str]) -> Row:
+def page_line(line: Standing, is_entrant: bool, counts: Mapping[str, str]) -> Row:
+    """Return an entry's line by the titles of its columns; ``counts`` are titles and attributes of those to show."""
     return {
         "": "▶" if is_entrant else "",
         "rank": "" if line.rank is None else line.rank,

@@ -16,10 +16,11 @@ from terrain.experiments.table1.environments.world import Table1World
 
 TITLES = {"S1": "move_base (S1)", "B": "tree (B)"}
 DOTS_PER_INCH = 90
+ROBOTS = 5  # whose routes are driven in the main conditions
 
 
 def draw_tracks(
-    file: Path, world: Table1World | None, tracks: Mapping[str, Sequence[Sequence[Sequence[float]]]], robots: int = 5
+    file: Path, world: Table1World | None, tracks: Mapping[str, Sequence[Sequence[Sequence[float]]]]
 ) -> None:
     """Write a PNG with one map for each condition.
 
@@ -29,13 +30,11 @@ def draw_tracks(
         Nothing but the tracks is drawn without it.
     tracks : mapping of str to list of (n, 2) lists
         Tracks [m] of every repetition of each condition.
-    robots : int
-        How many of the routes were driven.
     """
     figure, axes = plt.subplots(1, len(tracks), figsize=(6.2 * len(tracks), 6.4), squeeze=False)
     for axis, (name, of_condition) in zip(axes[0], tracks.items(), strict=True):
         if world is not None:
-            _draw_world(axis, world, robots)
+            _draw_world(axis, world)
         axis.set_aspect("equal")
         axis.set_xlabel("x [m]")
         axis.set_ylabel("y [m]")
@@ -48,10 +47,10 @@ def draw_tracks(
     plt.close(figure)
 
 
-def _draw_world(axis: Any, world: Table1World, robots: int) -> None:
+def _draw_world(axis: Any, world: Table1World) -> None:
     grid = world.grid()
     axis.imshow(~grid.occupied, origin="lower", extent=grid.bounds, cmap="gray", vmin=-1.0, vmax=1.0)
-    for route in world.routes[:robots]:
+    for route in world.routes[:ROBOTS]:
         corners = np.array([*route, route[0]])
         axis.plot(*corners.T, color="tab:orange", linewidth=3.0, alpha=0.25)
     for number, (x, y, _) in enumerate(world.waypoints, start=1):

@@ -15,6 +15,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from mbf_abstract.access.admission import PRIVATE_HEADERS
 from mbf_abstract.access.page_access import PageAccess
 from terrain.viewer.server.page_messages import is_allowed
 from terrain.viewer.server.visitor_channel import MAX_REFUSED, POLICY_VIOLATION, PREFIX, VisitorChannel
@@ -22,12 +23,6 @@ from terrain.viewer.server.visitor_channel import MAX_REFUSED, POLICY_VIOLATION,
 MAX_MESSAGE = 64 * 1024  # bytes; messages of a browser are far shorter
 MAX_VISITORS = 32
 TRY_AGAIN_LATER = 1013  # WebSocket close code (RFC 6455, 7.4.1)
-HEADERS = {
-    "Referrer-Policy": "no-referrer",  # the token is in the address
-    "Cache-Control": "no-store",
-    "X-Frame-Options": "DENY",
-    "X-Content-Type-Options": "nosniff",
-}
 
 _logger = logging.getLogger(__name__)
 _logger.addHandler(logging.NullHandler())  # wrong requests must not fill the terminal
@@ -111,7 +106,7 @@ class PageGuard:
         assert found is not None
         response = process(connection, replace(request, path=found[1]))
         if response is not None:
-            response.headers.update(HEADERS)
+            response.headers.update(PRIVATE_HEADERS)
         return response
 
     async def _handle(self, handler: Callable[[Any], Awaitable[None]], connection: Any) -> None:

@@ -16,6 +16,7 @@ import json
 import secrets
 from typing import Any
 
+from mbf_abstract.access.outbox import Outbox
 from mbf_abstract.access.page_access import Role
 from mbf_abstract.time.clock import Clock, WallClock
 from terrain.viewer.server.visitor_messages import VisitorActions, parsed
@@ -73,7 +74,7 @@ class VisitorChannel:
             return
         outbox = self._outboxes[visitor] = _Outbox(asyncio.get_running_loop())
         self.send(visitor, "role", role.value)
-        tasks = [asyncio.create_task(outbox.empty_into(connection))]
+        tasks = [asyncio.create_task(outbox.send_to(connection))]
         if role is Role.STEER:
             tasks.append(asyncio.create_task(self._beat(visitor)))
         try:
@@ -102,38 +103,19 @@ class VisitorChannel:
         self._visitors = {key: one for key, one in self._visitors.items() if one != client.client_id}
 
 
-class _Outbox:
+class _Outbox(Outbox):
     """The newest message of each kind that is still to be sent."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        super().__init__()
         self._loop = loop
-        self._waiting: dict[str, str] = {}
         self._posted: dict[str, str] = {}
-        self._filled = asyncio.Event()
 
     def post(self, kind: str, text: str) -> None:
         """Have a message sent that differs from the last one of its kind; from any thread, never waits."""
         if self._posted.get(kind) != text and not self._loop.is_closed():
             self._posted[kind] = text
-            self._loop.call_soon_threadsafe(self._put, kind, text)
-
-    def _put(self, kind: str, text: str) -> None:
-        self._waiting[kind] = text
-        self._filled.set()
-
-    async def empty_into(self, connection: Any) -> None:
-        """Send what comes, one after the other."""
-        from websockets.exceptions import ConnectionClosed
-
-        while True:
-            await self._filled.wait()
-            self._filled.clear()
-            waiting, self._waiting = self._waiting, {}
-            for text in waiting.values():
-                try:
-                    await connection.send(text)
-                except ConnectionClosed:
-                    return
+            self._loop.call_soon_threadsafe(self.newest, kind, text)
 
 
 async def _take_all(connection: Any, role: Role, visitor: int, actions: VisitorActions) -> None:

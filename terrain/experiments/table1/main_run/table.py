@@ -98,10 +98,10 @@ def result(groups: Mapping[str, Tallies]) -> dict[str, dict[str, ConditionResult
     }
 
 
-def learning_curve(tallies: Tallies, measure: str, condition: str = CURVE) -> list[Ratio]:
-    """Ratio of ``planner_ratio`` or ``time_ratio`` after one, two, three ... seeds, in the order of the seeds."""
+def learning_curve(tallies: Tallies, measure: str) -> list[Ratio]:
+    """Ratio ``planner_ratio`` or ``time_ratio`` of ``CURVE`` after 1, 2, 3 ... seeds, in the order of the seeds."""
     reference = tallies[MOVE_BASE.base.name]
-    own = tallies[condition]
+    own = tallies[CURVE]
     ratios = [judge_condition(own[:count], reference[:count]) for count in range(1, len(own) + 1)]
     return [getattr(judged, measure) for judged in ratios]
 
