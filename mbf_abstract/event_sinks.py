@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
-from mbf_abstract.events import Event, EventKind
+from mbf_abstract.events import Event, EventKind, EventSink
 
 DEFAULT_MEMORY_EVENTS = 10_000
 
@@ -17,7 +17,7 @@ DEFAULT_MEMORY_EVENTS = 10_000
 DEFAULT_MAX_FILE_BYTES = 256 * 1024 * 1024
 
 
-class MemorySink:
+class MemorySink(EventSink):
     """Keeps the newest ``maxlen`` events; for tests, notebooks and as the substitute of a broken file."""
 
     def __init__(self, maxlen: int = DEFAULT_MEMORY_EVENTS) -> None:
@@ -38,9 +38,6 @@ class MemorySink:
         """Keep one event, forgetting the oldest if full."""
         with self._lock:
             self._events.append(event)
-
-    def close(self) -> None:
-        """Keep what is there."""
 
 
 class JsonLinesSink:

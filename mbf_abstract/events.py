@@ -89,4 +89,5 @@ class EventSink(Protocol):
         """Take one event; raising takes the sink out of the bus."""
 
     def close(self) -> None:
-        """Finish; idempotent."""
+        """Finish; idempotent. Nothing to do for a sink that holds nothing open."""
+        return None

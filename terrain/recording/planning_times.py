@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbf_abstract.events import Event, EventKind
+from mbf_abstract.events import Event, EventKind, EventSink
 from mbf_abstract.time.clock import wall_seconds
 
 
-class PlanningTimes:
+class PlanningTimes(EventSink):
     """A sink of a run's events that takes the wall time of every call of a planner.
 
     In simulated time nothing else runs during a call; in real time the calls share the CPU with the rest.
@@ -27,9 +27,6 @@ class PlanningTimes:
             self._began[call] = wall_seconds()
         elif event.kind is EventKind.PLUGIN_CALL_ENDED and call in self._began:
             self._seconds.append(wall_seconds() - self._began.pop(call))
-
-    def close(self) -> None:
-        """Do nothing; the times stay readable."""
 
     def to_json(self) -> dict[str, float | None]:
         """Median, 95th percentile and maximum [ms] for timing.json; None where nothing was planned."""

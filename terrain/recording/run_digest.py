@@ -11,13 +11,13 @@ import hashlib
 import struct
 from collections.abc import Callable
 
-from mbf_abstract.events import Event
+from mbf_abstract.events import Event, EventSink
 from mbf_abstract.geometry import Command, Pose, Twist
 
 POSE, COMMAND, EVENT = b"p", b"c", b"e"  # a letter before each entry, so that no entry can pass for another
 
 
-class RunDigest:
+class RunDigest(EventSink):
     """The running digest of one run; also a sink of its events.
 
     Parameters
@@ -44,9 +44,6 @@ class RunDigest:
     def write(self, event: Event) -> None:
         """Take an event, as the line that ``events.jsonl`` holds."""
         self._hash.update(EVENT + event.to_json().encode() + b"\n")
-
-    def close(self) -> None:
-        """Do nothing; the digest stays readable."""
 
     def hexdigest(self) -> str:
         """Return the digest of all that was taken so far, 64 hexadecimal digits."""

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.event_bus import EventBus
-from mbf_abstract.events import Event, EventKind
+from mbf_abstract.events import Event, EventKind, EventSink
 from mbf_abstract.geometry import FloatArray
 from terrain.recording.metrics import measure
 from terrain.recording.recorded_maps import RecordedMesh
@@ -33,7 +33,7 @@ ROWS = ("times", "poses", "twists", "commands", "scan_origins")
 PERIOD = 2.0  # s of the run in one part; to write one takes about a millisecond
 
 
-class RecordingParts:
+class RecordingParts(EventSink):
     """Writes what a recorder has got, part by part; a sink of the run's events, too.
 
     Parameters
@@ -67,9 +67,6 @@ class RecordingParts:
     def write(self, event: Event) -> None:
         """Keep an event for the next part."""
         self._events.append(event)
-
-    def close(self) -> None:
-        """Keep the parts."""
 
     def after_step(self, time: float) -> None:
         """Write the next part if it is due; on the simulator's thread, ``time`` [s] is simulated."""

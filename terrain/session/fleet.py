@@ -43,8 +43,11 @@ class Periodically:
             self._call()
 
 
-class NamedSink:
-    """Hands the events of one robot on, its name before their sources: ``anna/move_base``."""
+class NamedSink(EventSink):
+    """Hands the events of one robot on, its name before their sources: ``anna/move_base``.
+
+    The sink stays open when this one is closed, because other robots share it.
+    """
 
     def __init__(self, name: str, sink: EventSink) -> None:
         self._name = name
@@ -53,9 +56,6 @@ class NamedSink:
     def write(self, event: Event) -> None:
         """Hand an event on."""
         self._sink.write(replace(event, source=f"{self._name}/{event.source}"))
-
-    def close(self) -> None:
-        """Keep the sink open, because other robots share it."""
 
 
 class FleetSession:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 
-from mbf_abstract.events import Event
+from mbf_abstract.events import Event, EventSink
 from terrain.recording.recorder import Taken
 from terrain.recording.recording import Recording
 from terrain.session.session import Session
@@ -13,7 +13,7 @@ from terrain.session.session import Session
 MAX_EVENTS = 10_000  # that wait for the next part
 
 
-class EventQueue:
+class EventQueue(EventSink):
     """A sink that keeps events until the next part; the oldest are dropped."""
 
     def __init__(self, earlier: Iterable[Event] = ()) -> None:
@@ -22,9 +22,6 @@ class EventQueue:
     def write(self, event: Event) -> None:
         """Take one event."""
         self._events.append(event)
-
-    def close(self) -> None:
-        """Keep what has not been taken."""
 
     def take(self) -> list[Event]:
         """Return what has come since the last part."""

@@ -15,7 +15,7 @@ from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.access.web_socket_server import Offer, WebSocketServer
 from mbf_abstract.event_bus import EventBus
 from mbf_abstract.event_values import error_text
-from mbf_abstract.events import Event
+from mbf_abstract.events import Event, EventSink
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.pace import Pace
 from terrain.recording.recording import Recording
@@ -34,7 +34,7 @@ SOURCE = "foxglove"
 Note = Callable[[str], None]
 
 
-class ServerNotes:
+class ServerNotes(EventSink):
     """A sink for what the server reports; who has been refused is for the user to know."""
 
     def __init__(self, note: Note) -> None:
@@ -44,9 +44,6 @@ class ServerNotes:
         """Pass a warning on."""
         if "refused" in event.data:
             self._note(f"{SOURCE}: {event.data['refused']}")
-
-    def close(self) -> None:
-        """Do nothing."""
 
 
 class Faults:

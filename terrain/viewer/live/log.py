@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from mbf_abstract.events import Event, EventKind
+from mbf_abstract.events import Event, EventKind, EventSink
 from mbf_abstract.executives.tree_events import NodeState, TreeState
 from terrain.viewer.reports.event_lines import NOTABLE, Line, is_shown, line_of
 
@@ -33,7 +33,7 @@ class Snapshot:
     timeline: tuple[Event, ...] = ()
 
 
-class LiveLog:
+class LiveLog(EventSink):
     """Sink that keeps what the page shows; read it with ``snapshot`` from any thread."""
 
     def __init__(self) -> None:
@@ -61,9 +61,6 @@ class LiveLog:
                     self._ends[event.source] = line
             elif event.kind is EventKind.TREE:
                 self._tree.take(event)
-
-    def close(self) -> None:
-        """Do nothing."""
 
     def snapshot(self) -> Snapshot:
         """Return what is known now."""
