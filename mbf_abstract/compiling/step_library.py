@@ -5,18 +5,24 @@ When to use: as a step of ``passes.LoopCompiler``. When not: for functions whose
 numba makes machine code of every function when it has compiled it, and that of its callers from the intermediate code
 of both. Of a step without a wrapper for Python the first is never run. What it would leave undone is what numba does
 when it takes kernels from its disk: to give the caller's code the environments (the objects of Python that a function
-refers to) of the steps in it (decision 0095).
+refers to) of the steps in it (decision 0095). Nor is a step optimised as a whole: its callers are, with it in them
+(decision 0098).
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from llvmlite import binding as llvm
 from numba.core.codegen import JITCodeLibrary, RuntimeLinker
 from numba.core.compiler_machinery import register_pass
 from numba.core.environment import lookup_environment
 from numba.core.typed_passes import NativeLowering
 
+from mbf_abstract.compiling.known_types import KnownOperators
+
+TIDYING = ("sroa", "instruction_combine", "simplify_cfg", "global_dead_code_eliminate")
+"""LLVM's passes over the code of a step: from memory to registers, and without what nobody uses."""
 _ENVIRONMENT = "_ZN08NumbaEnv"
 """How the variables begin that hold the address of an environment, as in numba's own ``CompileResult``."""
 
@@ -24,18 +30,9 @@ _ENVIRONMENT = "_ZN08NumbaEnv"
 class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Code of a kernel with all steps that it calls."""
 
-    counts_holders = True
-    """Whether it counts who holds its arrays."""
-
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Optimise each function before the whole module, where that finds what need not be counted.
-
-        Elsewhere it is done twice: the steps are among those for the whole module.
-        """
-        if self.counts_holders:
-            super()._optimize_functions(ll_module)
-        else:
-            ll_module.data_layout = self._codegen._data_layout
+        """Leave out what numba does for each function of a module, and again when it optimises the whole module."""
+        ll_module.data_layout = self._codegen._data_layout
 
     def _finalize_specific(self) -> None:
         super()._finalize_specific()
@@ -56,6 +53,19 @@ class StepLibrary(KernelLibrary):
     """Code of a step, to be linked into that of kernels; it is not run by itself."""
 
     codegen = _NoMachineCode()
+
+    def _optimize_final_module(self) -> None:
+        """Leave to LLVM's whole optimisation of the callers what is not done by ``TIDYING``.
+
+        An llvmlite of before 2025 has no passes to choose from.
+        """
+        manager: Any = getattr(llvm, "create_new_module_pass_manager", lambda: None)()
+        if not all(hasattr(manager, f"add_{name}_pass") for name in TIDYING):
+            super()._optimize_final_module()
+            return
+        for name in TIDYING:
+            getattr(manager, f"add_{name}_pass")()
+        manager.run(self._final_module, self._codegen._pass_builder(opt=0))
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
@@ -79,10 +89,11 @@ class StepLibrary(KernelLibrary):
 class KernelLowering(NativeLowering):  # type: ignore[misc]
     """numba's step from its own code to the processor's, which steps of other kernels leave half-way."""
 
+    lowering_class = KnownOperators
+
     def run_pass(self, state: Any) -> bool:
         """Make the code of a function."""
         kind = StepLibrary if state.flags.no_cpython_wrapper else KernelLibrary
         state.library = kind(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.counts_holders = state.flags.nrt
         state.library.enable_object_caching()
         return bool(super().run_pass(state))

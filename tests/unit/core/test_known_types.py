@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 from numba import types
-from numba.core import errors
+from numba.core import errors, event
 from numba.core.registry import cpu_target
 
 from mbf_abstract.compiling.known_types import KnownTypes
@@ -60,3 +60,62 @@ def test_what_is_allowed_with_some_options_is_not_known_with_others():
     assert allowed(3) == 3
     with pytest.raises(errors.TypingError):
         refused(3)
+
+
+@pytest.mark.parametrize("option", ["no_cpython_wrapper", "forceinline", "nogil"])
+def test_a_function_of_numba_is_compiled_once_for_kernels_whose_options_do_not_concern_it(option):
+    def kernel(first, second):
+        return max(first, second, first)
+
+    def other(first, second):
+        return max(second, first, second)
+
+    numbers = (types.float64, types.float64)
+    numba.njit(pipeline_class=LoopCompiler)(kernel).compile(numbers)
+    with event.install_recorder("numba:compile") as recorder:
+        numba.njit(pipeline_class=LoopCompiler, **{option: True})(other).compile(numbers)
+    assert {entry.data["dispatcher"].py_func for _, entry in recorder.buffer} == {other}
+
+
+def test_numbers_given_by_name_are_known_too(context):
+    found_types = {}
+    arguments = ((types.int64,), {"dtype": types.NumberClass(types.float64)})
+    first = KnownTypes(context, found_types).resolve_function_type(context.resolve_value_type(np.empty), *arguments)
+    nobody = KnownTypes(None, found_types)
+    assert nobody.resolve_function_type(context.resolve_value_type(np.empty), *arguments) is first
+
+
+def operations(first, second, whole):
+    """Operations of numbers of several types, with constants and powers, which numba has code of their own for."""
+    return (
+        first + second * 2 - whole / 3,
+        first**2 + first**second + whole**3,
+        (whole + 1) % 3 + (whole // 2 << 1 | whole & 6),
+        (first < second) + (whole >= 2) * 4 + (first != whole),
+        (first < second) & (whole >= 2),
+    )
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32, np.int64])
+def test_operations_give_what_they_give_with_numbas_own_compiler(kind):
+    usual, ours = numba.njit(operations), numba.njit(pipeline_class=LoopCompiler)(operations)
+    for first, second, whole in product((0.5, 3.0), (2.5, 0.1), (1, 7)):
+        arguments = kind(first), second, np.int32(whole)
+        assert ours(*arguments) == usual(*arguments)
+
+
+def test_the_rules_of_an_operation_are_asked_once(monkeypatch):
+    asked = []
+
+    def noted(function, context, arguments, names, ask=types.Function.get_call_type):
+        asked.append((function, arguments))
+        return ask(function, context, arguments, names)
+
+    def product_and_sum(first, second):
+        return first * second + first
+
+    numbers = (types.float64, types.float64)
+    numba.njit(pipeline_class=LoopCompiler)(product_and_sum).compile(numbers)
+    monkeypatch.setattr(types.Function, "get_call_type", noted)
+    numba.njit(pipeline_class=LoopCompiler, nogil=True)(product_and_sum).compile(numbers)
+    assert asked == []
