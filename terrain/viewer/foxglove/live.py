@@ -17,7 +17,6 @@ from mbf_abstract.event_bus import EventBus
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import Event, EventSink
 from mbf_abstract.time.clock import WallClock
-from mbf_abstract.time.pace import Pace
 from terrain.recording.recording import Recording
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session
@@ -173,7 +172,7 @@ class LiveFoxglove:
         note: Note = lambda text: None,
         title: str = "Foxglove",
     ) -> None:
-        self._session, self._sequence, self._speed, self._title = session, sequence, speed, title
+        self._session, self._speed, self._title = session, speed, title
         server_options = options.server_options()
         self.access = server_options.access
         self._controls = controls = LiveControls(session, sequence, SOURCE, "Foxglove")
@@ -187,7 +186,6 @@ class LiveFoxglove:
         )
         name = f"mbf {session.scenario.name}"
         self._server = LiveServer(name, RunFeed(session), steering, server_options, note)
-        self._pace = Pace(WallClock())
         self._exits = ExitStack()
 
     @property
@@ -212,11 +210,5 @@ class LiveFoxglove:
 
     def _after_step(self, time: float) -> None:
         self._controls.work_off()
-        self._pace.wait(time, self._limit())
+        self._controls.keep_pace(time, self._speed)
         self._server.look()
-
-    def _limit(self) -> float:
-        """Simulated seconds per second; in real time while the run waits for a goal. A wall clock needs no pacing."""
-        if isinstance(self._session.clock, WallClock):
-            return 0.0
-        return self._speed or (1.0 if self._sequence.is_waiting else 0.0)

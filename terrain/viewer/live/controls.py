@@ -17,6 +17,8 @@ import numpy as np
 
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import FloatArray, Pose
+from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.pace import Pace
 from terrain.scenarios.faults import LocalizationJump, SensorFault
 from terrain.sensors.rays import StaticRays
 from terrain.session.goal_sequence import AskedGoal, AskedWaypoints, GoalSequence
@@ -71,6 +73,7 @@ class LiveControls:
         self._sequence = sequence
         self._source, self._place = source, place
         self._server = session.navigator.server
+        self._pace = Pace(WallClock())
         self._waiting: deque[Callable[[], None]] = deque(maxlen=MAX_WAITING)
 
     def post(self, command: Callable[[], None]) -> None:
@@ -89,6 +92,17 @@ class LiveControls:
             self._server.pause_all()  # in every step, for goals that an executive has sent since the last one
         if self.by_hand:
             self._cancel_for_teleoperation()  # likewise
+
+    def keep_pace(self, time: float, speed: float) -> None:
+        """Wait as long as the run, at ``time`` [s], is ahead of so many simulated seconds per second; 0 = never.
+
+        A run that waits for a goal goes on in real time. A wall clock needs no pacing.
+        """
+        if isinstance(self._session.clock, WallClock):
+            speed = 0.0
+        elif speed == 0.0 and self._sequence.is_waiting:
+            speed = 1.0
+        self._pace.wait(time, speed)
 
     # ------------------------------------------------------------------------------- commands, to be posted
     def place(self, ray: Ray, facing: Ray | None = None) -> None:

@@ -16,7 +16,6 @@ from mbf_abstract.access.page_access import LOOPBACK, PageAccess, Role, is_loopb
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.time.clock import WallClock
-from mbf_abstract.time.pace import Pace
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session
 from terrain.viewer.live.controls import LiveControls
@@ -117,7 +116,6 @@ class LiveSession:
         self._history = History()
         self._wall = WallClock()
         self._next_frame = 0.0
-        self._pace = Pace(self._wall)
         self._stick = Stick(
             session.navigator.server, self._wall, self.controls.take_over, self.controls.note_end_of_teleoperation
         )
@@ -164,7 +162,7 @@ class LiveSession:
         self.controls.work_off()
         if self._page is not None:
             self._stick.step(self.controls.holding)
-        self._pace.wait(time, self._speed())
+        self.controls.keep_pace(time, self._options.speed)
         if self._page is None:
             return
         try:
@@ -174,12 +172,6 @@ class LiveSession:
             self._page = None
             self._stick.stop("the page has failed")
             self._session.events.emit(EventKind.FAULT, "live_view", type=type(error).__name__, message=str(error))
-
-    def _speed(self) -> float:
-        """Simulated seconds per second; in real time without a goal, as by hand. A wall clock needs no pacing."""
-        if isinstance(self._session.clock, WallClock):
-            return 0.0
-        return self._options.speed or (1.0 if self._sequence.is_waiting else 0.0)
 
     def _sample(self, time: float, period: float) -> None:
         if self._history.is_due(time, period):
