@@ -1,10 +1,10 @@
 """The one way kernels are compiled: lazily, cached on disk, without the interpreter lock, types kept for mypy.
 
-Five habits keep compilation short: indices and counters start as ``Index(0)`` or ``Count(0)`` (a plain 0 passed on
-to another kernel makes numba compile that one for the literal first), rows of arrays are copied by loops (slices and
-array expressions bring in their error messages' string formatting), arrays handed in are of one kind everywhere
-(read-only and writable ones are different types), arrays of which all is written begin as ``np.empty`` with ``dtype=``
-(``np.zeros`` compiles two more functions per type of array), and points are vectors of ``vectors.py`` (the components
+Five habits keep compilation short: indices and counters start as ``Index(0)`` or ``Count(0)`` (a plain 0 passed on to
+another kernel makes numba compile that one for the literal first), rows of arrays are copied by loops (slices and array
+expressions bring in their error messages' string formatting), arrays handed in are of one kind everywhere (read-only
+and writable ones are different types), arrays begin as ``np.empty`` with ``dtype=`` and are filled by ``fill``
+(``np.zeros`` compiles three more functions per type of array), and points are vectors of ``vectors.py`` (the components
 written out are three times the work for type inference).
 """
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, kernel
+from mbf_mesh_nav.kernels.fill import fill
 
 _UNCHANGED, _WAITING, _WRITTEN = 0, 1, 2
 
@@ -29,7 +30,8 @@ def show_changes(
     (mesh_navigation's rule; adding keeps ``w >= L``, so a straight-line bound stays admissible). A vertex may be named
     more than once.
     """
-    state = np.zeros(costs.shape[0], dtype=np.uint8)
+    state = np.empty(costs.shape[0], dtype=np.uint8)
+    fill(state, Count(0))
     for index in range(changed.shape[0]):
         vertex = Index(changed[index])
         costs[vertex], lethal[vertex] = new_costs[vertex], new_lethal[vertex]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 
 MAX_STEPS = 1000
@@ -164,7 +165,8 @@ def settle_footprints(
     radius = 0.5 * np.hypot(wheelbase, track)
     ring = np.empty(4 * heading_count, dtype=np.float64)
     wheels = np.empty(4 * heading_count, dtype=np.float64)
-    seen = np.full(count, -1, dtype=np.int32)
+    seen = np.empty(count, dtype=np.int32)
+    fill(seen, Count(-1))
     members = np.empty(count, dtype=np.int32)
     for vertex in range(count):
         for heading in range(heading_count):

@@ -16,6 +16,7 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel, plain_kernel
+from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.search.near_far import after
 
@@ -148,7 +149,8 @@ def repair_distances(
     count, reach = len(vertices), np.float32(radius)
     touched = np.empty(count, dtype=np.int32)
     queue = np.empty(count + 1, dtype=np.int32)
-    state = np.zeros(count, dtype=np.uint8)
+    state = np.empty(count, dtype=np.uint8)
+    fill(state, Count(0))
     size, head, tail = Index(0), Index(0), Index(0)
     # 1. New lethal vertices are at distance 0, former ones at none.
     for changed_vertex in changed:

@@ -12,6 +12,7 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, difference, dot, norm, row
 
 _SPHERE = (0.0, 0.0, 0.0)
@@ -68,7 +69,8 @@ def height_differences(
     """Greatest minus least height along the own normal over v and N_r(v), metric across the normal, (V,) [m]."""
     count = vertices.shape[0]
     differences = np.empty(count, dtype=np.float32)
-    seen = np.full(count, -1, dtype=np.int32)
+    seen = np.empty(count, dtype=np.int32)
+    fill(seen, Count(-1))
     members = np.empty(count, dtype=np.int32)
     for vertex in range(count):
         foot, normal = row(vertices, vertex), row(normals, vertex)
@@ -103,7 +105,8 @@ def neighbourhood_means(
     """Mean of ``values`` over v and N_r(v), metric of the sphere, (V,)."""
     count = vertices.shape[0]
     means = np.empty(count, dtype=np.float32)
-    seen = np.full(count, -1, dtype=np.int32)
+    seen = np.empty(count, dtype=np.int32)
+    fill(seen, Count(-1))
     members = np.empty(count, dtype=np.int32)
     for vertex in range(count):
         size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, _SPHERE, np.inf, seen, members)
@@ -126,7 +129,8 @@ def normal_tip_distances(
     """Mean distance [m] of the tips of unit normals planted on v and on the members of N_r(v), (V,)."""
     count = vertices.shape[0]
     distances = np.empty(count, dtype=np.float32)
-    seen = np.full(count, -1, dtype=np.int32)
+    seen = np.empty(count, dtype=np.int32)
+    fill(seen, Count(-1))
     members = np.empty(count, dtype=np.int32)
     for vertex in range(count):
         size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, _SPHERE, np.inf, seen, members)

@@ -13,6 +13,7 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, difference, dot, norm, row
 
 Borders = tuple[IntArray, IntArray, IntArray]
@@ -32,7 +33,8 @@ def grow_patches(vertices: FloatArray, offsets: IntArray, neighbours: IntArray) 
         The patch of each vertex, the vertices in order of patches, and where each patch begins among them.
     """
     count = vertices.shape[0]
-    patch_of = np.full(count, -1, dtype=np.int32)
+    patch_of = np.empty(count, dtype=np.int32)
+    fill(patch_of, Count(-1))
     members, begins = np.empty(count, dtype=np.int32), np.empty(count + 1, dtype=np.int32)
     patches, size = Count(0), Count(0)
     for seed in range(count):
@@ -133,7 +135,9 @@ def height_differences_by_patches(
     count = vertices.shape[0]
     differences = np.empty(count, dtype=np.float32)
     border_begins, border_vertices, border_next = borders
-    seen, judged = np.full(count, -1, dtype=np.int32), np.full(len(bounds), -1, dtype=np.int32)
+    seen, judged = np.empty(count, dtype=np.int32), np.empty(len(bounds), dtype=np.int32)
+    fill(seen, Count(-1))
+    fill(judged, Count(-1))
     is_taken = np.empty(len(bounds), dtype=np.bool_)
     single, taken = np.empty(count, dtype=np.int32), np.empty(len(bounds), dtype=np.int32)
     for vertex in range(count):

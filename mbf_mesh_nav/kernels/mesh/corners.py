@@ -11,6 +11,7 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import FlagArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 
 
@@ -44,7 +45,8 @@ def write_corner_weights(
     A record's weights (3F, 3) are those of its edges to the first and to the second other corner, and between these.
     ``cancel_flag`` (1,) is polled; returns False if it ended the call, and the weights are good for nothing then.
     """
-    is_written = np.zeros(len(neighbour_offsets), dtype=np.bool_)
+    is_written = np.empty(len(neighbour_offsets), dtype=np.bool_)
+    fill(is_written, Count(0))
     for place in range(len(changed)):
         if place % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
             return False

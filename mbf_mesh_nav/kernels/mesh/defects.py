@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.mesh.vectors import cross, difference, dot, norm, triangle
 
 
@@ -42,7 +43,9 @@ def superfluous_faces(faces: IntArray, face_offsets: IntArray, incident: IntArra
     repeated, surplus : (F,) bool
         Faces with the corners of an earlier one, in any order; other faces that would be the third at an edge.
     """
-    repeated, surplus = np.zeros(faces.shape[0], dtype=np.bool_), np.zeros(faces.shape[0], dtype=np.bool_)
+    repeated, surplus = np.empty(faces.shape[0], dtype=np.bool_), np.empty(faces.shape[0], dtype=np.bool_)
+    fill(repeated, Count(0))
+    fill(surplus, Count(0))
     for face in range(faces.shape[0]):
         for corner in range(3):
             start, end, third = faces[face, corner], faces[face, (corner + 1) % 3], faces[face, (corner + 2) % 3]
@@ -83,10 +86,12 @@ def winding_flips(faces: IntArray, face_neighbours: IntArray, areas: FloatArray)
     Each patch of faces is oriented from its first face; of the two possible answers the one that turns less area wins.
     """
     face_count = faces.shape[0]
-    flip = np.zeros(face_count, dtype=np.bool_)
-    seen = np.zeros(face_count, dtype=np.bool_)
-    patch = np.zeros(face_count, dtype=np.int32)
-    patches = np.zeros(face_count, dtype=np.int32)
+    flip = np.empty(face_count, dtype=np.bool_)
+    fill(flip, Count(0))
+    seen = np.empty(face_count, dtype=np.bool_)
+    fill(seen, Count(0))
+    patch = np.empty(face_count, dtype=np.int32)
+    patches = np.empty(face_count, dtype=np.int32)
     contradictions, patch_count = 0, 0
     for start in range(face_count):
         if seen[start]:
@@ -130,7 +135,9 @@ def fans_at_vertices(
 
     A fan is a group of faces around a vertex that are connected over edges; a sound vertex has one.
     """
-    fans, counts = np.full(len(incident), -1, dtype=np.int32), np.zeros(len(face_offsets) - 1, dtype=np.int32)
+    fans, counts = np.empty(len(incident), dtype=np.int32), np.empty(len(face_offsets) - 1, dtype=np.int32)
+    fill(fans, Count(-1))
+    fill(counts, Count(0))
     waiting = np.empty(len(incident), dtype=np.int32)
     for vertex in range(counts.shape[0]):
         begin, end = face_offsets[vertex], face_offsets[vertex + 1]

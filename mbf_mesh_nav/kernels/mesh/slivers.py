@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.fill import fill
 
 
 @inner_kernel
@@ -47,7 +48,8 @@ def flip_slivers(
     ``faces`` and ``face_source`` are changed in place, two faces for two. A vertex takes part in one flip only, since
     ``incident`` is not kept up to date; call it again until it returns 0, the number of flips.
     """
-    taken = np.zeros(vertices.shape[0], dtype=np.bool_)
+    taken = np.empty(vertices.shape[0], dtype=np.bool_)
+    fill(taken, Count(0))
     flips = 0
     for face in range(faces.shape[0]):
         if not flat[face]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_array_kernel, inner_kernel, kernel
+from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 
 
@@ -35,7 +36,8 @@ def touching_discs(
     least_share : float
         A centre with less of a corner than this lies on the edge opposite to it.
     """
-    touching = np.zeros(len(faces), dtype=np.bool_)
+    touching = np.empty(len(faces), dtype=np.bool_)
+    fill(touching, Count(0))
     shares = np.empty(3)
     for i in range(len(faces)):
         face = mesh_faces[faces[i]]

@@ -15,6 +15,7 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.mesh.surface_walk import turned, walk
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, cross, difference, dot, norm, row
@@ -95,7 +96,8 @@ def score_rollouts(
     face_neighbours, face_normals = surface.face_neighbours, surface.face_normals
     sequence_count, step_count, _ = controls.shape
     scores = np.empty(sequence_count, dtype=np.float64)
-    collided = np.zeros(sequence_count, dtype=np.bool_)
+    collided = np.empty(sequence_count, dtype=np.bool_)
+    fill(collided, Count(0))
     path_points, remaining, facing = path
     weights, roll_limit, pitch_limit = critics
     sin_roll, sin_pitch = math.sin(roll_limit), math.sin(pitch_limit)

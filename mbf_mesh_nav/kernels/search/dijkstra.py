@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.lowest_bit import BITS, lowest_bit
 from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.near_far import IN_FAR, IN_NEAR, UNQUEUED, after, raise_threshold
@@ -84,7 +85,8 @@ def propagate_distances(
     """
     near = np.empty(len(distances) + 1, dtype=np.int32)
     far = np.empty(len(distances) + 1, dtype=np.int32)
-    state = np.zeros(len(distances), dtype=np.uint8)
+    state = np.empty(len(distances), dtype=np.uint8)
+    fill(state, Count(0))
     keys = distances if towards is None else np.empty(len(distances), dtype=np.float32)  # valid in the far list
     head, tail, far_count = Index(0), Index(0), Index(0)
     for seed in seeds:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from mbf_mesh_nav.arrays import Float32Array, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, kernel
+from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph
 
@@ -54,7 +55,8 @@ def invalidate_subtrees(
     reset = np.empty(len(distances) + 1, dtype=np.int32)
     beside = np.empty(len(distances) + 1, dtype=np.int32)
     seeds = np.empty(len(distances), dtype=np.int32)
-    state = np.zeros(len(distances), dtype=np.uint8)
+    state = np.empty(len(distances), dtype=np.uint8)
+    fill(state, Count(0))
     count, beside_count, seed_count, reader = Index(0), Index(0), Index(0), Index(0)
     for changed_vertex in changed:
         vertex = Index(changed_vertex)

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inlined_kernel, kernel
+from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.lowest_bit import BITS, lowest_bit
 from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
@@ -111,7 +112,8 @@ def propagate_wave(
     # 1. The queue (see ``bucket_queue.py``). A record adds one entry, three with edges; what is taken again none.
     state = blocked.astype(np.uint8)  # _FREE, or 1 where it is blocked
     room = (3 if along_edges else 1) * len(corner_ends) + len(seeds)
-    heads, links = np.full(RING, EMPTY, dtype=np.int32), np.empty(room, dtype=np.int32)
+    heads, links = np.empty(RING, dtype=np.int32), np.empty(room, dtype=np.int32)
+    fill(heads, Count(EMPTY))
     entries, near = np.empty(room, dtype=np.uint64), np.empty(room, dtype=np.uint64)
     used, near_size, bucket = Index(0), Index(0), Count(0)
     inverse_width, near_source = BUCKETS_PER_STEP / np.float32(step), NEAR_STEPS * np.float32(step)
@@ -119,8 +121,7 @@ def propagate_wave(
         entry = entry_of(distances[seed], Index(seed))
         used, near_size = put(heads, links, entries, near, used, near_size, bucket, inverse_width, entry)
         state[seed] = _SETTLED  # their distances are exact from the start
-    limit, is_large = np.float32(np.inf), len(distances) > LARGE
-    pops, targets_settled = 0, 0
+    limit, is_large, pops, targets_settled = np.float32(np.inf), len(distances) > LARGE, 0, 0
     while True:
         # 2. The vertex with the least distance is settled; entries from before it was lowered are dropped.
         if near_size == Index(0):

@@ -17,6 +17,7 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_array_kernel, inner_kernel, kernel
+from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, between, row, set_row
 from mbf_mesh_nav.kernels.wave.fronts import NO_BEND, SLACK
@@ -65,7 +66,8 @@ def trace_descent(
     points = np.empty((capacity, 3), dtype=np.float64)
     point_faces = np.empty(capacity, dtype=np.int32)
     vertices, faces = surface.vertices, surface.faces
-    passed = np.zeros(len(faces), dtype=np.bool_)
+    passed = np.empty(len(faces), dtype=np.bool_)
+    fill(passed, Count(0))
     face, vertex = Count(start_face), Count(-1)
     place = barycentric(vertices, faces[face], start)
     set_row(points, Count(0), start)
