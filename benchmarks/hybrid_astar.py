@@ -29,6 +29,7 @@ import numpy as np
 from numba import types
 from numba.typed import Dict
 
+from mbf_abstract.compiling.decorators import kernel
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.files.map_io import load_image, load_map
@@ -48,7 +49,6 @@ from mbf_costmap_nav.kernels.car.motion_primitives import (
     steering_of,
     weight_of,
 )
-from mbf_costmap_nav.kernels.compiled import kernel
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner

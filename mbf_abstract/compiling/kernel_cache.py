@@ -97,7 +97,7 @@ def _cache_folder(kernels: Path) -> Path | None:
     """Folder for the machine code of the kernels as they are now; those of earlier versions are removed."""
     name = "kernels-" + hashlib.sha256(str(kernels.absolute()).encode()).hexdigest()[:16]
     for place in (config.CACHE_DIR, kernels / "__pycache__", os.path.expanduser("~/.cache/mbf-flex")):
-        folder = Path(place, name, _sources(kernels))
+        folder = Path(place, name, _sources(kernels, Path(__file__).parent))
         try:
             if not place or not kernels.is_dir():
                 continue
@@ -113,11 +113,12 @@ def _cache_folder(kernels: Path) -> Path | None:
     return None
 
 
-def _sources(folder: Path) -> str:
-    """Digest of all Python files of a folder and those below it."""
+def _sources(*folders: Path) -> str:
+    """Digest of all Python files of folders and those below them: the kernels, and how they are compiled."""
     digest = hashlib.sha256()
-    for file in sorted(folder.rglob("*.py")):
-        digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
+    for folder in folders:
+        for file in sorted(folder.rglob("*.py")):
+            digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from terrain.kernels.compiled import Index, inlined_kernel, kernel
+from mbf_abstract.compiling.decorators import Index, inlined_kernel, kernel
 from terrain.kernels.ray_tree import OCTANTS, WIDTH
 
 FloatArray = NDArray[np.float64]

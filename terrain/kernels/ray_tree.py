@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from terrain.kernels.compiled import inner_kernel, kernel
+from mbf_abstract.compiling.decorators import inner_kernel, kernel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]

@@ -13,12 +13,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import inner_kernel, kernel, plain_kernel
 
 TWO_PI = 2.0 * np.pi
 
 
-@kernel
+@plain_kernel
 def _turn(angle: float, forward: bool) -> float:
     """Angle in [0, 2 pi) for a curve that may only be driven forward, else in (-pi, pi]."""
     if forward:
@@ -43,7 +43,7 @@ STEERING = np.array(
 """Steering of the words that begin with a curve to the left; the others mirror or reverse them."""
 
 
-@kernel
+@inner_kernel
 def _three_segments(x: float, y: float, yaw: float, forward: bool, words: NDArray[np.float64]) -> None:
     """Write the lengths of LSL, LSR and LRL from the origin to a pose into the first rows of ``words``."""
     # 1. Centres of the two left circles: LSL and LRL run between them.
@@ -65,7 +65,7 @@ def _three_segments(x: float, y: float, yaw: float, forward: bool, words: NDArra
         words[1, 0], words[1, 1], words[1, 2] = first, straight, _turn(first - yaw, forward)
 
 
-@kernel
+@inner_kernel
 def _outer_arcs(u: float, v: float, cx: float, cy: float, yaw: float) -> tuple[float, float]:
     """First and last arc of a CCCC word with the middle arcs ``u`` and ``v`` (tau and omega, equation 8.6)."""
     delta = u - v
@@ -77,7 +77,7 @@ def _outer_arcs(u: float, v: float, cx: float, cy: float, yaw: float) -> tuple[f
     return first, _turn(first - u + v - yaw, False)
 
 
-@kernel
+@inner_kernel
 def _more_segments(x: float, y: float, yaw: float, words: NDArray[np.float64]) -> None:
     """Write the lengths of the two LRLR, LRSL, LRSR and LRSLR into the last rows of ``words``."""
     quarter = 0.5 * np.pi
@@ -158,7 +158,7 @@ def curve_between(
     return car_curve((c * dx + s * dy) / radius, (c * dy - s * dx) / radius, end[2] - start[2], reversing)
 
 
-@kernel
+@plain_kernel
 def drive(x: float, y: float, yaw: float, steering: float, length: float, radius: float) -> tuple[float, float, float]:
     """Pose after a segment of ``length`` [m, negative = backward] at a steering of 1, 0 or -1 on ``radius`` [m]."""
     if steering == 0.0:

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.compiling.decorators import inner_kernel, plain_kernel
 from mbf_costmap_nav.grid.costmap import LETHAL
-from mbf_costmap_nav.kernels.compiled import kernel
 from mbf_costmap_nav.kernels.map.footprint_cost import footprint_cost
 from mbf_costmap_nav.kernels.map.inflation import LARGEST_RADIUS, inflate
 from mbf_costmap_nav.kernels.map.line_cells import cost_along
@@ -106,7 +106,7 @@ def _disc_centres(samples: FloatArray) -> FloatArray:
     return centres
 
 
-@kernel
+@plain_kernel
 def pose_cost(
     cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, samples: FloatArray, pose: FloatArray
 ) -> int:
@@ -120,13 +120,13 @@ def pose_cost(
     return cost if _fits(cells, geometry, samples, pose) else -1
 
 
-@kernel
+@plain_kernel
 def _fits(cells: NDArray[np.uint8], geometry: FloatArray, samples: FloatArray, pose: FloatArray) -> bool:
     worst = footprint_cost(cells, geometry[0], geometry[1], geometry[2], samples, pose[0], pose[1], pose[2])
     return bool(0 <= worst < 254 or worst == 255)
 
 
-@kernel
+@inner_kernel
 def _centre_cost(cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, pose: FloatArray) -> int:
     ix = int(np.floor((pose[0] - geometry[1]) / geometry[0]))
     iy = int(np.floor((pose[1] - geometry[2]) / geometry[0]))
@@ -136,7 +136,7 @@ def _centre_cost(cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, p
     return cost if cost < 253 else -1
 
 
-@kernel
+@plain_kernel
 def fitting_cost(ground: Ground, pose: FloatArray) -> int:
     """``pose_cost`` on the ground, faster far from obstacles; with ``CLOSE_COST`` where larger outlines do not fit."""
     geometry = ground.geometry
@@ -158,7 +158,7 @@ def fitting_cost(ground: Ground, pose: FloatArray) -> int:
     return cost
 
 
-@kernel
+@plain_kernel
 def driven_cost(ground: Ground, start: FloatArray, poses: FloatArray) -> float:
     """Mean cost of the centre over poses (n, 3) that are driven one after the other from ``start``, or -1.
 

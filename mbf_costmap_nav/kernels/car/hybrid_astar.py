@@ -20,6 +20,7 @@ import heapq
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.compiling.decorators import Count, inner_kernel, kernel
 from mbf_costmap_nav.kernels.car.curves import sample_word
 from mbf_costmap_nav.kernels.car.ground import Ground, driven_cost
 from mbf_costmap_nav.kernels.car.joints import HEADINGS, FloatArray, Joint, Target, heuristic, new_target, try_joints
@@ -38,7 +39,6 @@ from mbf_costmap_nav.kernels.car.motion_primitives import (
     weight_of,
 )
 from mbf_costmap_nav.kernels.car.state_tree import StateTree, best_state, new_tree, with_state
-from mbf_costmap_nav.kernels.compiled import Count, kernel
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FOUND
 from mbf_costmap_nav.kernels.search.lazy_field import FieldMemory, new_field
 
@@ -55,7 +55,7 @@ SPARE_STATES = 500
 """With a path known, the search for a better one goes on for half of the states so far, and these."""
 
 
-@kernel
+@inner_kernel
 def _bin_of(ground: Ground, car: Car, pose: FloatArray) -> int:
     """Number of the state's bin."""
     geometry = ground.geometry
@@ -94,7 +94,7 @@ def _grow(
     return tree
 
 
-@kernel
+@inner_kernel
 def _nearest_state(tree: StateTree, goal: FloatArray, tolerance: float) -> int:
     """Nearest state of a tree to the goal, within ``tolerance`` [m] and half a heading bin; or -1."""
     best, nearest = tolerance, -1

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.compiling.decorators import Count, inner_kernel, kernel
 from mbf_costmap_nav.kernels.car.curves import curve_between
 from mbf_costmap_nav.kernels.car.ground import Ground
 from mbf_costmap_nav.kernels.car.motion_primitives import (
@@ -16,7 +17,6 @@ from mbf_costmap_nav.kernels.car.motion_primitives import (
     direction_of,
 )
 from mbf_costmap_nav.kernels.car.state_tree import StateTree, best_state
-from mbf_costmap_nav.kernels.compiled import Count, kernel
 from mbf_costmap_nav.kernels.search.lazy_field import BUCKET, WAITING, LazyField, field_cost
 from mbf_costmap_nav.kernels.search.padded_grid import octile_distance
 from mbf_costmap_nav.kernels.search.search_cells import Records
@@ -112,7 +112,7 @@ def _join(
         joint.word[:] = word
 
 
-@kernel
+@inner_kernel
 def _ancestor(tree: StateTree, state: int, generations: int) -> int:
     """State so many arcs nearer to the root, or the root."""
     for _ in range(generations):

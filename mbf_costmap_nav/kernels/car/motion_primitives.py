@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.compiling.decorators import Count, kernel, plain_kernel
 from mbf_costmap_nav.kernels.car.curves import drive, sample_word
 from mbf_costmap_nav.kernels.car.ground import Ground, driven_cost
 from mbf_costmap_nav.kernels.car.state_tree import StateTree
-from mbf_costmap_nav.kernels.compiled import Count, kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -61,13 +61,13 @@ class Car(NamedTuple):
     pieces: int
 
 
-@kernel
+@plain_kernel
 def steering_of(motion: int) -> float:
     """-1 right, 0 straight, 1 left."""
     return float(motion % 3 - 1)
 
 
-@kernel
+@plain_kernel
 def direction_of(motion: int) -> float:
     """1 forward, -1 backward, 0 for no motion."""
     if motion == NO_MOTION:
@@ -75,20 +75,20 @@ def direction_of(motion: int) -> float:
     return 1.0 if motion < FORWARD_MOTIONS else -1.0
 
 
-@kernel
+@plain_kernel
 def weight_of(car: Car, steering: float, direction: float) -> float:
     """Factor on the length of a piece over free cells."""
     weight = car.reverse_factor if direction < 0.0 else 1.0
     return weight if steering == 0.0 else weight * car.turning_factor
 
 
-@kernel
+@plain_kernel
 def change_of(car: Car, before: float, after: float) -> float:
     """Cost [m] of driving in the direction ``after`` behind ``before``; 0 stands for none."""
     return car.change_cost if before * after < 0.0 else 0.0
 
 
-@kernel
+@plain_kernel
 def sample_arc(pose: FloatArray, motion: int, side: float, car: Car, into: FloatArray) -> None:
     """Fill ``into`` (pieces, 3) with poses evenly spaced over an arc from (or on the backward side to) a pose."""
     signed, steering = side * direction_of(motion) * car.step, steering_of(motion)

@@ -13,10 +13,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.compiling.decorators import kernel
 from mbf_costmap_nav.kernels.car.curves import curve_between, sample_word
 from mbf_costmap_nav.kernels.car.ground import Ground, fitting_cost
 from mbf_costmap_nav.kernels.car.motion_primitives import Car, change_of, curve_cost, weight_of
-from mbf_costmap_nav.kernels.compiled import kernel
 
 FloatArray = NDArray[np.float64]
 

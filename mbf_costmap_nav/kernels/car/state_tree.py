@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import Count, kernel
+from mbf_abstract.compiling.decorators import Count, kernel, plain_kernel
 
 FIRST_CAPACITY = 4096
 NO_STATE = -1
@@ -68,7 +68,7 @@ def _empty_tree(capacity: int) -> StateTree:
     )
 
 
-@kernel
+@plain_kernel
 def _slot_of(tree: StateTree, bin_of_pose: int) -> int:
     """Place of a bin in the hash table, or the free place where it belongs."""
     last = np.uint64(tree.slots.size - 1)
@@ -78,7 +78,7 @@ def _slot_of(tree: StateTree, bin_of_pose: int) -> int:
     return int(slot)
 
 
-@kernel
+@plain_kernel
 def best_state(tree: StateTree, bin_of_pose: int) -> int:
     """Best state of a bin, or NO_STATE."""
     return int(Count(tree.slots[_slot_of(tree, bin_of_pose)]))

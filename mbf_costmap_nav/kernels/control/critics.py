@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import kernel, plain_kernel
 
 Float32Array = NDArray[np.float32]
 
@@ -124,7 +124,7 @@ def alignment(poses: Float32Array, path: Float32Array, spacing: float, stride: i
     return total / np.float32(max(looked, 1))
 
 
-@kernel
+@plain_kernel
 def furthest_reached(poses: Float32Array, path: Float32Array, stride: int) -> int:
     """Largest index of the path point nearest to any trajectory's end, looking at every ``stride``-th sample."""
     _, steps, samples = poses.shape

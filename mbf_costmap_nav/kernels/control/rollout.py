@@ -11,12 +11,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import kernel, plain_kernel
 
 Float32Array = NDArray[np.float32]
 
 
-@kernel
+@plain_kernel
 def _slow_down(velocities: Float32Array, top_speed: np.float32) -> None:
     """Shorten (vx, vy) of velocities (3, steps, samples) to ``top_speed`` [m/s] where they are longer."""
     for t in range(velocities.shape[1]):
@@ -116,7 +116,7 @@ def integrate(velocities: Float32Array, yaw: float, dt: float, poses: Float32Arr
             out_x[n], out_y[n], out_yaw[n] = x[n], y[n], heading[n]
 
 
-@kernel
+@plain_kernel
 def add_noise(nominal: Float32Array, noise: Float32Array, deviation: Float32Array, velocities: Float32Array) -> None:
     """Fill velocities (3, steps, samples) with ``nominal`` (3, steps) plus noise times deviation (3,).
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import kernel
 from mbf_costmap_nav.kernels.map.line_cells import cost_along
 
 UNKNOWN_AS = 0

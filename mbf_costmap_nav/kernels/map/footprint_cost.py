@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import inner_kernel, kernel, plain_kernel
 
 SPARE_REACH = 0.5
 """How much larger the square is that is looked at once for many poses, in reaches of the footprint."""
@@ -21,7 +21,7 @@ OUTSIDE = -1
 """Cost of a pose whose footprint leaves the map and touches nothing worse."""
 
 
-@kernel
+@plain_kernel
 def footprint_cost(
     cells: NDArray[np.uint8],
     resolution: float,
@@ -67,7 +67,7 @@ def footprint_cost(
     return OUTSIDE if outside else worst
 
 
-@kernel
+@plain_kernel
 def first_lethal(
     cells: NDArray[np.uint8],
     resolution: float,
@@ -89,7 +89,7 @@ def first_lethal(
     return -1, -1
 
 
-@kernel
+@plain_kernel
 def first_collision(
     cells: NDArray[np.uint8],
     resolution: float,
@@ -119,7 +119,7 @@ def first_collision(
     return -1
 
 
-@kernel
+@plain_kernel
 def _reach(samples: NDArray[np.float64]) -> float:
     """Distance [m] from the base to the farthest sample."""
     farthest = 0.0
@@ -128,7 +128,7 @@ def _reach(samples: NDArray[np.float64]) -> float:
     return float(np.sqrt(farthest))
 
 
-@kernel
+@inner_kernel
 def _square_is_clear(cells: NDArray[np.uint8], x: float, y: float, reach: float) -> bool:
     """Whether no cell of the map at most ``reach`` along x and y from a point [cells] is lethal."""
     height, width = cells.shape

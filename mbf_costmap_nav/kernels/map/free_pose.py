@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import kernel
 from mbf_costmap_nav.kernels.map.rasterisation import polygon_costs
 
 FREE, INSCRIBED, LETHAL, UNKNOWN, OUTSIDE = 0, 1, 2, 3, 4

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import inner_kernel, kernel, plain_kernel
 
 LARGEST_RADIUS = 253
 """[cells] Column distances up to one more than the radius have to fit 8 bits, their squares 16."""
@@ -57,7 +57,7 @@ def inflate(
     _spread_rows(cells, (x0, y0, x1, y1), columns, left, bottom, radius, cost_of_closeness, np.uint8(unknown_from))
 
 
-@kernel
+@plain_kernel
 def _column_distances(seeds: Cells, left: int, bottom: int, columns: Cells, cap: np.uint8) -> None:
     """Distance of each cell to the nearest seed of its column, at most ``cap``: one sweep up, one down.
 
@@ -72,14 +72,14 @@ def _column_distances(seeds: Cells, left: int, bottom: int, columns: Cells, cap:
         _sweep_row(columns[y + 1], columns[y], cap)
 
 
-@kernel
+@inner_kernel
 def _mark_row(seeds: Cells, row: Cells, cap: np.uint8) -> None:
     """Distance 0 at seeds, ``cap`` elsewhere."""
     for x in range(row.size):
         row[x] = np.uint8(0) if seeds[x] != 0 else cap
 
 
-@kernel
+@inner_kernel
 def _sweep_row(previous: Cells, row: Cells, cap: np.uint8) -> None:
     """Set row = min(row, previous + 1), at most ``cap``."""
     for x in range(row.size):
@@ -119,7 +119,7 @@ def _spread_rows(
         _raise_costs(cells[y, x0:x1], costs, unknown_from)
 
 
-@kernel
+@inner_kernel
 def _closeness_row(row: Cells, closeness: Closeness, first: np.uint64) -> np.uint16:
     """Fill closeness = TOP - row^2 from ``first`` on; return the largest."""
     closest = np.uint16(0)
@@ -131,7 +131,7 @@ def _closeness_row(row: Cells, closeness: Closeness, first: np.uint64) -> np.uin
     return closest
 
 
-@kernel
+@inner_kernel
 def _raise_row(nearest: Closeness, closeness: Closeness, left: np.uint64, right: np.uint64, offset: np.uint16) -> None:
     """Set nearest = max(nearest, closeness of the neighbours dx cells to the left and right - dx^2)."""
     for x in range(np.uint64(nearest.size)):
@@ -140,14 +140,14 @@ def _raise_row(nearest: Closeness, closeness: Closeness, left: np.uint64, right:
         nearest[x] = max(nearest[x], close)
 
 
-@kernel
+@inner_kernel
 def _look_up(nearest: Closeness, cost_of_closeness: Cells, costs: Cells) -> None:
     """Costs of a row; a loop of its own, as table look-ups do not vectorise and the rest does."""
     for x in range(np.uint64(nearest.size)):
         costs[x] = cost_of_closeness[nearest[x]]
 
 
-@kernel
+@inner_kernel
 def _raise_costs(row: Cells, costs: Cells, unknown_from: np.uint8) -> None:
     """Raise cells to the costs; unknown, the largest byte, is replaced by costs from ``unknown_from`` on."""
     for x in range(np.uint64(row.size)):

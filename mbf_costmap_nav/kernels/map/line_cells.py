@@ -13,13 +13,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import inner_kernel, plain_kernel
 
 OUTSIDE_COST = 254
 """What lies off the map counts as lethal."""
 
 
-@kernel
+@inner_kernel
 def _cost_of_cell(cells: NDArray[np.uint8], unknown: int, ix: int, iy: int) -> int:
     """Cost of a cell; ``unknown`` for one of cost 255."""
     if ix < 0 or iy < 0 or ix >= cells.shape[1] or iy >= cells.shape[0]:
@@ -27,7 +27,7 @@ def _cost_of_cell(cells: NDArray[np.uint8], unknown: int, ix: int, iy: int) -> i
     return int(cells[iy, ix]) if cells[iy, ix] < 255 else unknown
 
 
-@kernel
+@plain_kernel
 def cost_along(cells: NDArray[np.uint8], unknown: int, x0: float, y0: float, x1: float, y1: float) -> int:
     """Highest cost of the cells that a line runs through.
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import inner_kernel, kernel
 from mbf_costmap_nav.kernels.map.footprint_cost import first_collision, footprint_cost
 from mbf_costmap_nav.kernels.map.path_poses import course_along, headed_poses
 
@@ -53,7 +53,7 @@ def fits_along(
     return bool(first_collision(cells, resolution, origin_x, origin_y, samples, headed) < 0)
 
 
-@kernel
+@inner_kernel
 def _turn_collides(
     cells: NDArray[np.uint8],
     resolution: float,

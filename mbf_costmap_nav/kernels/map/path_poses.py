@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import Count, kernel
+from mbf_abstract.compiling.decorators import Count, inner_kernel, kernel, plain_kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ def yaw_quaternions(yaws: FloatArray) -> FloatArray:
     return quaternions
 
 
-@kernel
+@plain_kernel
 def first_off_grid(
     points: FloatArray, width: int, height: int, resolution: float, origin_x: float, origin_y: float
 ) -> int:
@@ -93,7 +93,7 @@ def first_off_grid(
     return -1
 
 
-@kernel
+@plain_kernel
 def _moves(positions: FloatArray, i: int) -> bool:
     return bool(
         positions[i + 1, 0] != positions[i, 0]
@@ -102,7 +102,7 @@ def _moves(positions: FloatArray, i: int) -> bool:
     )
 
 
-@kernel
+@plain_kernel
 def _step(positions: FloatArray, i: int) -> tuple[float, float, float, bool]:
     return (
         positions[i + 1, 0] - positions[i, 0],
@@ -112,7 +112,7 @@ def _step(positions: FloatArray, i: int) -> tuple[float, float, float, bool]:
     )
 
 
-@kernel
+@inner_kernel
 def _set_level(quaternions: FloatArray, i: int, x: float, y: float, z: float) -> None:
     """The quaternion of a frame whose z axis is up and whose x axis points along (x, y, z), seen from above."""
     upward = (z + 0.0) * 0.0
@@ -156,7 +156,7 @@ def _filled(given: FloatArray, spacing: float) -> FloatArray:
     return lengths
 
 
-@kernel
+@plain_kernel
 def _piece(given: FloatArray, length: float, first: int) -> int:
     """Index of the last point, from ``first`` on, that is no farther along the path than ``length`` [m]."""
     while first + 1 < len(given) and given[first + 1] <= length:
@@ -164,7 +164,7 @@ def _piece(given: FloatArray, length: float, first: int) -> int:
     return first
 
 
-@kernel
+@plain_kernel
 def _place(points: FloatArray, given: FloatArray, length: float, piece: int) -> tuple[float, float]:
     """The place at a length [m] along the path, on the line that begins at the point ``piece``, as ``numpy.interp``."""
     if length <= given[piece] or piece + 1 == len(given):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import kernel, plain_kernel
 from mbf_costmap_nav.kernels.map.rasterisation import rasterise_polygon
 
 FloatArray = NDArray[np.float64]
@@ -71,7 +71,7 @@ def depths_in(things: NDArray[np.int32], corners: FloatArray, at_least: FloatArr
     return depths
 
 
-@kernel
+@plain_kernel
 def _depth(corners: FloatArray, x: float, y: float) -> float:
     """Distance of a point from the nearest side, negative outside of the polygon."""
     nearest, inside = np.inf, False

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import inner_kernel, kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ def rasterise_polygon(corners: FloatArray, box: tuple[int, int, int, int]) -> tu
     return x0, y0, mask
 
 
-@kernel
+@inner_kernel
 def _cover_side(mask: NDArray[np.uint8], u0: float, v0: float, u1: float, v1: float) -> None:
     """Mark the cells a side passes, v0 <= v1, row by row."""
     rows, columns = mask.shape

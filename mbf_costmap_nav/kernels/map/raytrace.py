@@ -14,13 +14,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import inner_kernel, plain_kernel
 
 FloatArray = NDArray[np.float64]
 TouchedBox = NDArray[np.int64]
 
 
-@kernel
+@plain_kernel
 def clear_rays(
     cells: NDArray[np.uint8],
     lower_left: FloatArray,
@@ -75,7 +75,7 @@ def clear_rays(
         )
 
 
-@kernel
+@inner_kernel
 def cut_to_range(start_value: float, slope: float, size: int, start: float, stop: float) -> tuple[float, float]:
     """Part [start, stop] of a line start_value + t * slope that lies in [0, size] (Liang and Barsky 1984)."""
     if slope == 0.0:
@@ -86,7 +86,7 @@ def cut_to_range(start_value: float, slope: float, size: int, start: float, stop
     return max(start, first), min(stop, second)
 
 
-@kernel
+@inner_kernel
 def grow_touched(touched: TouchedBox, x: int, y: int) -> None:
     """Grow the box by one cell."""
     if touched[2] <= touched[0]:
@@ -96,7 +96,7 @@ def grow_touched(touched: TouchedBox, x: int, y: int) -> None:
     touched[2], touched[3] = max(touched[2], x + 1), max(touched[3], y + 1)
 
 
-@kernel
+@plain_kernel
 def _write_line(cells: NDArray[np.uint8], x0: int, y0: int, x1: int, y1: int, value: int, touched: TouchedBox) -> None:
     """Bresenham's line; rounding as costmap_2d (the error starts at half the longer extent)."""
     grow_touched(touched, x0, y0)
@@ -121,7 +121,7 @@ def _write_line(cells: NDArray[np.uint8], x0: int, y0: int, x1: int, y1: int, va
         flat[offset] = value
 
 
-@kernel
+@plain_kernel
 def mark_points(
     cells: NDArray[np.uint8],
     lower_left: FloatArray,

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import plain_kernel
 
 FADE_DISTANCE = 1.2
 """Distance [m] at which the belief in a reading is halved."""
@@ -20,7 +20,7 @@ LEAST_PROBABILITY = 0.02
 """Beliefs stay this far from certainty, so that later readings can still change them."""
 
 
-@kernel
+@plain_kernel
 def occupied_given_reading(distance: float, angle: float, reading: float, half_angle: float, band: float) -> float:
     """Probability that a cell at (distance [m], angle [rad]) is occupied when the sensor reads ``reading`` [m].
 
@@ -37,7 +37,7 @@ def occupied_given_reading(distance: float, angle: float, reading: float, half_a
     return 0.5
 
 
-@kernel
+@plain_kernel
 def update_cone(
     probability: NDArray[np.float32],
     lower_left: NDArray[np.float64],

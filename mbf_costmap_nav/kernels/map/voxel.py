@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import inner_kernel, kernel, plain_kernel
 from mbf_costmap_nav.kernels.map.raytrace import cut_to_range, grow_touched
 
 Columns = NDArray[np.uint32]
@@ -48,20 +48,22 @@ def clear_voxel_rays(
         Box of columns, grown.
     """
     height, width = marked.shape
-    top = np.array([width - 1, height - 1, levels - 1])
-    start_point = (sensor - lower_corner) / voxel
+    top = (width - 1, height - 1, levels - 1)
+    start_point, direction = np.empty(3), np.empty(3)
+    first, last = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
+    for axis in range(3):
+        start_point[axis] = (sensor[axis] - lower_corner[axis]) / voxel[axis]
     for i in range(len(ends)):
-        length = np.sqrt(np.sum((ends[i] - sensor) ** 2))
+        length = distance_between(ends[i], sensor)
         if length < min_range:
             continue
-        direction = (ends[i] - lower_corner) / voxel - start_point
         start = min_range / length if length > 0.0 else 0.0
         stop = max_range / length if length > max_range else 1.0
         for axis in range(3):
+            direction[axis] = (ends[i, axis] - lower_corner[axis]) / voxel[axis] - start_point[axis]
             start, stop = cut_to_range(start_point[axis], direction[axis], top[axis] + 1, start, stop)
         if start > stop:
             continue
-        first, last = np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64)
         for axis in range(3):
             first[axis] = min(top[axis], int(start_point[axis] + start * direction[axis]))
             last[axis] = min(top[axis], int(start_point[axis] + stop * direction[axis]))
@@ -70,14 +72,25 @@ def clear_voxel_rays(
         grow_touched(touched, last[0], last[1])
 
 
+@inner_kernel
+def distance_between(point: FloatArray, other: FloatArray) -> float:
+    """Distance [m] of two points (3,)."""
+    x, y, z = point[0] - other[0], point[1] - other[1], point[2] - other[2]
+    return float(np.sqrt(x * x + y * y + z * z))
+
+
 @kernel
 def clear_voxel_line(marked: Columns, seen: Columns, first: NDArray[np.int64], last: NDArray[np.int64]) -> None:
     """Make the voxels of a line free, both ends (ix, iy, iz) included and on the grid."""
-    extents = np.abs(last - first)
-    steps = np.sign(last - first)
-    longest = int(extents.max())
-    errors = np.full(3, longest // 2)
-    at = first.copy()
+    extents, steps, at = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
+    errors = np.empty(3, dtype=np.int64)
+    longest = 0
+    for axis in range(3):
+        extents[axis], at[axis] = abs(last[axis] - first[axis]), first[axis]
+        steps[axis] = 1 if last[axis] > first[axis] else -1
+        longest = max(longest, extents[axis])
+    for axis in range(3):
+        errors[axis] = longest // 2
     for step in range(longest + 1):
         bit = np.uint32(1) << np.uint32(at[2])
         marked[at[1], at[0]] &= ~bit
@@ -92,7 +105,7 @@ def clear_voxel_line(marked: Columns, seen: Columns, first: NDArray[np.int64], l
                 at[axis] += steps[axis]
 
 
-@kernel
+@plain_kernel
 def mark_voxels(
     marked: Columns,
     seen: Columns,
@@ -112,19 +125,19 @@ def mark_voxels(
     """
     height, width = marked.shape
     for i in range(len(points)):
-        distance = np.sqrt(np.sum((points[i] - sensor) ** 2))
+        distance = distance_between(points[i], sensor)
         if not hits[i] or distance < min_range or distance > max_range:
             continue
-        at = (points[i] - lower_corner) / voxel
-        z = max(0.0, at[2])
-        if 0.0 <= at[0] < width and 0.0 <= at[1] < height and z < levels:
+        x, y = (points[i, 0] - lower_corner[0]) / voxel[0], (points[i, 1] - lower_corner[1]) / voxel[1]
+        z = max(0.0, (points[i, 2] - lower_corner[2]) / voxel[2])
+        if 0.0 <= x < width and 0.0 <= y < height and z < levels:
             bit = np.uint32(1) << np.uint32(z)
-            marked[int(at[1]), int(at[0])] |= bit
-            seen[int(at[1]), int(at[0])] |= bit
-            grow_touched(touched, int(at[0]), int(at[1]))
+            marked[int(y), int(x)] |= bit
+            seen[int(y), int(x)] |= bit
+            grow_touched(touched, int(x), int(y))
 
 
-@kernel
+@plain_kernel
 def count_bits(word: np.uint32) -> int:
     """Return the number of set bits (Wegner 1960: clear the lowest one until none is left)."""
     count = 0
@@ -134,7 +147,7 @@ def count_bits(word: np.uint32) -> int:
     return count
 
 
-@kernel
+@plain_kernel
 def project_columns(
     marked: Columns,
     seen: Columns,

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import Count, kernel
+from mbf_abstract.compiling.decorators import Count, kernel, plain_kernel
 from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid
 
 
-@kernel
+@plain_kernel
 def line_cost(grid: PaddedGrid, a: int, b: int) -> np.float32:
     """Cost of the straight line between the centres of two cells (flat padded indices); inf if it is blocked.
 
@@ -55,7 +55,7 @@ def line_cost(grid: PaddedGrid, a: int, b: int) -> np.float32:
     return np.float32((total + (1.0 - done) * table[cells[b]]) * length)
 
 
-@kernel
+@plain_kernel
 def lines_cost(grid: PaddedGrid, corners: NDArray[np.int32]) -> float:
     """Sum of the costs of the straight lines between flat padded indices (n,), from the first on."""
     total = 0.0

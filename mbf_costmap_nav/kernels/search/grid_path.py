@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import Count, kernel
+from mbf_abstract.compiling.decorators import Count, inner_kernel, kernel
 from mbf_costmap_nav.kernels.search.padded_grid import SQRT2, PaddedGrid
 
 GRADIENT_STEP = 0.5
@@ -19,7 +19,7 @@ STEPS_PER_CELL = 4
 """A descent that stays in one cell longer than this turns in a ridge and is moved on to the best neighbour."""
 
 
-@kernel
+@inner_kernel
 def best_predecessor(grid: PaddedGrid, g: NDArray[np.float32], cell: int, cut_corners: bool) -> int:
     """Neighbour over which the search reached ``cell``: the one with the least ``g + step`` (not stored, refound)."""
     cells, stride, table = grid
@@ -62,7 +62,7 @@ def trace_cells(grid: PaddedGrid, g: NDArray[np.float32], end: int, cut_corners:
     return path[:length].copy()
 
 
-@kernel
+@inner_kernel
 def _slope(g: NDArray[np.float32], cell: int, step: int) -> float:
     """Slope of ``g`` at a cell along ``step``: central, one-sided next to unreached cells, 0 between two of them."""
     ahead, behind = g[cell + step], g[cell - step]
@@ -71,7 +71,7 @@ def _slope(g: NDArray[np.float32], cell: int, step: int) -> float:
     return float(ahead - g[cell]) if np.isinf(behind) else 0.5 * float(ahead - behind)
 
 
-@kernel
+@inner_kernel
 def _interpolated_gradient(g: NDArray[np.float32], stride: int, x: float, y: float) -> tuple[float, float]:
     """Bilinear gradient of ``g`` at a point [padded cells] from the four cells around it, unreached ones left out."""
     x0, y0 = int(np.floor(x)), int(np.floor(y))

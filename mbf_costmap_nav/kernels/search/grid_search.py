@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import kernel
 from mbf_costmap_nav.kernels.search.open_list import RING, bucket_width, enlarged_if_full
 from mbf_costmap_nav.kernels.search.padded_grid import INF, PaddedGrid, octile_distance
 from mbf_costmap_nav.kernels.search.relaxing import relax_bucket, relax_interpolated

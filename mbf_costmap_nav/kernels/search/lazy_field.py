@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import Count, kernel
+from mbf_abstract.compiling.decorators import Count, kernel
 from mbf_costmap_nav.kernels.search.open_list import RING, bucket_width, enlarged_if_full
 from mbf_costmap_nav.kernels.search.padded_grid import INF, octile_distance
 from mbf_costmap_nav.kernels.search.relaxing import relax_bucket

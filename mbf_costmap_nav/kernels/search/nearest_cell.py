@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.compiling.decorators import kernel
 from mbf_costmap_nav.kernels.car.ground import pose_cost
-from mbf_costmap_nav.kernels.compiled import kernel
 
 SAME_DISTANCE = 1e-6
 """Of cells whose distances [m] differ by less the one of lower cost is taken."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import kernel, plain_kernel
 from mbf_costmap_nav.kernels.search.padded_grid import INF, SQRT2, Integer
 
 RING = 128
@@ -24,7 +24,7 @@ IDLE = np.uint8(255)
 """State of a cell that waits in no bucket; any other value is the bucket's place in the ring."""
 
 
-@kernel
+@plain_kernel
 def bucket_width(table: NDArray[np.float32], steps: float) -> np.float32:
     """Width at which the ring holds a growth of the key by ``steps`` of the heaviest diagonal steps, at least 1.
 

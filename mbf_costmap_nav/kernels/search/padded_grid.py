@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import inner_kernel
 
 SQRT2 = np.float32(np.sqrt(2.0))
 INF = np.float32(np.inf)
@@ -60,7 +60,7 @@ def pad_cells(
     return padded.reshape(-1)
 
 
-@kernel
+@inner_kernel
 def octile_distance(dx: Integer, dy: Integer) -> np.float32:
     """Length of the shortest 8-connected path over ``dx``, ``dy`` >= 0 free cells."""
     if dx < dy:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import Count, kernel
+from mbf_abstract.compiling.decorators import Count, inner_kernel, plain_kernel
 from mbf_costmap_nav.kernels.search.open_list import IDLE
 from mbf_costmap_nav.kernels.search.padded_grid import INF, SQRT2
 from mbf_costmap_nav.kernels.search.search_cells import (
@@ -23,14 +23,14 @@ from mbf_costmap_nav.kernels.search.search_cells import (
 )
 
 
-@kernel
+@inner_kernel
 def _traversal(records: Records, table: NDArray[np.float32], cell: np.uint64) -> np.float32:
     """Look up what a cell's cost makes of a step, in the whole traversal or in halves of it."""
     traversal: np.float32 = table[(records[cell].state >> COST_SHIFT) & COST_BITS]
     return traversal
 
 
-@kernel
+@plain_kernel
 def _relax(
     records: Records,
     fresh: NDArray[np.int32],
@@ -47,7 +47,7 @@ def _relax(
     return np.uint64(count + np.uint64(reached < known))
 
 
-@kernel
+@inner_kernel
 def relax_bucket(
     records: Records,
     stride: int,
@@ -130,7 +130,7 @@ def relax_bucket(
     return count
 
 
-@kernel
+@inner_kernel
 def relax_interpolated(
     records: Records,
     stride: int,

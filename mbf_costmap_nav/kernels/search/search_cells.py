@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import inner_kernel, kernel, plain_kernel
 from mbf_costmap_nav.kernels.search.open_list import IDLE
 
 CELL = np.dtype([("g", np.float32), ("state", np.uint32)])
@@ -55,7 +55,7 @@ def whole_grid(cells: NDArray[np.uint8], stride: int) -> Box:
     return np.array([0, 0, stride, cells.size // stride], dtype=np.int64)
 
 
-@kernel
+@plain_kernel
 def write_box(cells: NDArray[np.uint8], words: NDArray[np.uint64], cancel_flag: NDArray[np.uint8], box: Box) -> None:
     """Write the records of a box of a padded grid as whole words, none reached; the padding is never plain.
 
@@ -72,7 +72,7 @@ def write_box(cells: NDArray[np.uint8], words: NDArray[np.uint64], cancel_flag: 
             words[y, x] = _UNTOUCHED | (np.uint64(cells[y, x]) << np.uint64(48))
 
 
-@kernel
+@inner_kernel
 def _write_row(
     below: NDArray[np.uint8],
     here: NDArray[np.uint8],

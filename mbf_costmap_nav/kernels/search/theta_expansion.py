@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import inner_kernel, plain_kernel
 from mbf_costmap_nav.kernels.search.open_list import IDLE
 from mbf_costmap_nav.kernels.search.padded_grid import INF, SQRT2, Integer, PaddedGrid, octile_distance
 from mbf_costmap_nav.kernels.search.short_lines import (
@@ -51,7 +51,7 @@ class Labels(NamedTuple):
     queued: NDArray[np.uint8]
 
 
-@kernel
+@plain_kernel
 def _relax(
     g: NDArray[np.float32],
     origin: NDArray[np.uint8],
@@ -82,7 +82,7 @@ def _relax(
     return np.uint64(count + np.uint64(improved))
 
 
-@kernel
+@inner_kernel
 def _best_settled(grid: PaddedGrid, g: NDArray[np.float32], cell: Integer) -> tuple[np.float32, Integer]:
     """Cost over the settled neighbour with the cheapest step to ``cell``, and its code; inf without one."""
     cells, row, table = grid
@@ -102,7 +102,7 @@ def _best_settled(grid: PaddedGrid, g: NDArray[np.float32], cell: Integer) -> tu
     return best, best_code
 
 
-@kernel
+@inner_kernel
 def expand_bucket(
     grid: PaddedGrid,
     labels: Labels,

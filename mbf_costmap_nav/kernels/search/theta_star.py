@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import kernel
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FIRST_CAPACITY, FOUND
 from mbf_costmap_nav.kernels.search.open_list import IDLE, RING, bucket_width, enlarged_if_full
 from mbf_costmap_nav.kernels.search.padded_grid import CELLS_PER_POLL, INF, PaddedGrid, octile_distance

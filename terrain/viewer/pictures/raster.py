@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.compiling.decorators import kernel
 from mbf_abstract.geometry import FloatArray
-from terrain.kernels.compiled import kernel
 from terrain.worlds.surface import Surface
 
 NEAR = 0.1  # m; triangles with a corner nearer to the camera are left out

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.maps.tracking.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import kernel
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.int64]

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.compiling.decorators import kernel
 from mbf_abstract.maps.tracking.kernels.clustering import (
     GREATEST_X,
     GREATEST_Y,
@@ -21,7 +22,6 @@ from mbf_abstract.maps.tracking.kernels.clustering import (
     MEAN_Z,
     POINTS,
 )
-from mbf_abstract.maps.tracking.kernels.compiled import kernel
 
 FloatArray = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.maps.tracking.kernels.compiled import kernel
+from mbf_abstract.compiling.decorators import kernel
 
 Float32Array = NDArray[np.float32]
 Int32Array = NDArray[np.int32]
