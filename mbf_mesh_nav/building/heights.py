@@ -13,11 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
 from mbf_mesh_nav.building.surface_patches import SurfacePatches
-from mbf_mesh_nav.kernels.building.patches import settle_patches, slopes_of_patches
+from mbf_mesh_nav.kernels.building.columns import LOWEST
+from mbf_mesh_nav.kernels.building.patches import DIRECTIONS, settle_patches, slopes_of_patches
 from mbf_mesh_nav.kernels.building.quads import distances_to_faces, fitted_heights
-from mbf_mesh_nav.kernels.building.smoothing import ACROSS, bends_of_patches, smoothed_heights, unsupported_patches
+from mbf_mesh_nav.kernels.building.smoothing import ACROSS, smoothed_heights
 
 SETTLINGS = 2
 """Times that slopes and heights are computed from each other."""
@@ -187,3 +188,43 @@ def without_false_ground(patches: SurfacePatches, limits: HeightLimits, least: i
         is_ground &= ~found
         standing[found] = (patches.ends - patches.firsts)[found]
     return replace(patches, standing=standing).without(~is_ground & (standing < least))
+
+
+def bends_of_patches(heights: FloatArray, counts: IntArray, links: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Second differences (n,) [m] of the heights along rows and columns, and what one point's error adds to each (n,).
+
+    The second is the variance of a difference for heights that are means of ``counts`` (P,) points with a variance of
+    one; ``links`` (P, 8) as in ``kernels.building.patches``.
+    """
+    one, other, is_seen = links[:, [0, 2]], links[:, [4, 6]], counts > 0
+    is_whole = (one >= 0) & (other >= 0) & is_seen[:, None] & is_seen[one] & is_seen[other]
+    patch, axis = np.nonzero(is_whole)
+    one, other = one[patch, axis], other[patch, axis]
+    bends = heights[one] - 2.0 * heights[patch] + heights[other]
+    return bends, 1.0 / counts[one] + 4.0 / counts[patch] + 1.0 / counts[other]
+
+
+def unsupported_patches(
+    heights: FloatArray, kinds: IntArray, links: IntArray, is_ground: BoolArray, step: float
+) -> BoolArray:
+    """Mask (P,) of lowest patches at an edge that are more than ``step`` [m] above where the ground beside them leads.
+
+    At the edge of what was seen a column may hold points of a post and none of the ground below it. Such a patch has
+    ground on one side, from which it stands out, and none in the three cells on the other.
+
+    Parameters
+    ----------
+    is_ground : (P,) bool
+        Patches that are still taken for ground; links to others do not count.
+    """
+    has_ground = (links >= 0) & is_ground[links]
+    mask = np.zeros(len(heights), dtype=np.bool_)
+    for direction in range(DIRECTIONS):
+        across = [(direction + turn) % DIRECTIONS for turn in (3, 4, 5)]
+        is_edge = has_ground[:, direction] & ~has_ground[:, across].any(axis=1)
+        edge = np.flatnonzero((kinds == LOWEST) & is_ground & is_edge)
+        beside = links[edge, direction]
+        behind = heights[links[beside, direction]]
+        rise = np.where(has_ground[beside, direction], np.maximum(heights[beside] - behind, 0.0), 0.0)
+        mask[edge[heights[edge] - heights[beside] - rise > step]] = True
+    return mask

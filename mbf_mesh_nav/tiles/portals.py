@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import Float32Array, IntArray
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, propagate_distances
-from mbf_mesh_nav.kernels.search.portal_costs import least_of_portals
 from mbf_mesh_nav.tiles.tile import TileKey
 
 NO_TARGETS = np.zeros(0, dtype=np.int32)
@@ -58,7 +57,9 @@ def costs_to_portals(
     distances[seeds] = seed_costs
     predecessors = np.full(len(distances), -1, dtype=np.int32)
     propagate_distances(graph, distances, predecessors, seeds, threshold_step, NO_TARGETS, NO_OFFSETS, NOT_CANCELLED)
-    return least_of_portals(distances, shared, portal_of, count)
+    least = np.full(count, np.inf, dtype=np.float32)
+    np.minimum.at(least, portal_of, distances[shared])
+    return least
 
 
 def portal_costs(

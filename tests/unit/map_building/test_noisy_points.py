@@ -10,11 +10,17 @@ from scipy.spatial import cKDTree
 from surveyed_ground import flat, from_wrong_poses, ground, hills, post
 
 from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
-from mbf_mesh_nav.building.heights import NOT_SMOOTHED, HeightLimits, smoothed
+from mbf_mesh_nav.building.heights import (
+    NOT_SMOOTHED,
+    HeightLimits,
+    bends_of_patches,
+    smoothed,
+    unsupported_patches,
+)
 from mbf_mesh_nav.building.map_facts import map_facts
 from mbf_mesh_nav.building.surface import build_surface
 from mbf_mesh_nav.kernels.building.patches import STEP_X, STEP_Y, link_patches
-from mbf_mesh_nav.kernels.building.smoothing import ACROSS, bends_of_patches, smoothed_heights, unsupported_patches
+from mbf_mesh_nav.kernels.building.smoothing import ACROSS, smoothed_heights
 
 NOISE, WHEELBASE = 0.06, 0.6
 
@@ -121,7 +127,7 @@ def test_a_patch_at_an_edge_that_stands_out_of_the_ground_beside_it_is_no_ground
     kinds, is_ground = np.zeros(heights.size, dtype=np.int32), np.ones(heights.size, dtype=np.bool_)
     found = unsupported_patches(heights.ravel(), kinds, links, is_ground, 0.2)
     assert np.flatnonzero(found).tolist() == [2 * columns + 4]
-    assert (STEP_X[4], STEP_Y[4]) == (-1, 0)  # directions as the kernel counts them
+    assert (STEP_X[4], STEP_Y[4]) == (-1, 0)  # directions as the patches count them
 
 
 def test_a_post_of_which_no_ground_was_seen_becomes_no_corner_of_the_surface(rng):
