@@ -34,24 +34,15 @@ from mbf_ros.rosbridge.navigation import ACTIONS
 from mbf_ros.rosbridge.protocol import Operation, OperationError, absolute, frame, text_in
 from mbf_ros.rosbridge_robot.connection import Connection, NotConnectedError
 
-FAILURES: dict[Any, int] = {
-    GetPathResult: GetPathOutcome.FAILURE,
-    ExePathResult: ExePathOutcome.FAILURE,
-    RecoveryResultMessage: RecoveryOutcome.FAILURE,
-    MoveBaseResult: MoveBaseOutcome.FAILURE,
-    FollowWaypointsResult: MoveBaseOutcome.FAILURE,
-    RefinePathResult: RefinePathOutcome.FAILURE,
+FAILURE_AND_JUMP: dict[Any, tuple[int, int]] = {
+    GetPathResult: (GetPathOutcome.FAILURE, GetPathOutcome.TF_ERROR),
+    ExePathResult: (ExePathOutcome.FAILURE, ExePathOutcome.TF_ERROR),
+    RecoveryResultMessage: (RecoveryOutcome.FAILURE, RecoveryOutcome.TF_ERROR),
+    MoveBaseResult: (MoveBaseOutcome.FAILURE, MoveBaseOutcome.TF_ERROR),
+    FollowWaypointsResult: (MoveBaseOutcome.FAILURE, MoveBaseOutcome.TF_ERROR),
+    RefinePathResult: (RefinePathOutcome.FAILURE, RefinePathOutcome.STOPPED),
 }
-"""Outcome of a goal that asks for what we do not support, by the result of its action."""
-JUMPS: dict[Any, int] = {
-    GetPathResult: GetPathOutcome.TF_ERROR,
-    ExePathResult: ExePathOutcome.TF_ERROR,
-    RecoveryResultMessage: RecoveryOutcome.TF_ERROR,
-    MoveBaseResult: MoveBaseOutcome.TF_ERROR,
-    FollowWaypointsResult: MoveBaseOutcome.TF_ERROR,
-    RefinePathResult: RefinePathOutcome.STOPPED,
-}
-"""Outcome of a goal during which the robot's time jumped."""
+"""Outcomes of a goal that asks for what we do not support, and of one during which the robot's time jumped."""
 LARGE = 1e38
 """What stands for infinity; servers find that the largest float32 overflows when it comes as text."""
 
@@ -126,7 +117,8 @@ class OfferedGoals:
             self._answer_with(goal_id, name, mapping.refusal(error, self._context()), Status.ABORTED)
             return
         except MessageError as error:
-            self._answer(goal_id, name, mapping.refused(FAILURES[mapping.refused], str(error)), Status.ABORTED)
+            failure, _ = FAILURE_AND_JUMP[mapping.refused]
+            self._answer(goal_id, name, mapping.refused(failure, str(error)), Status.ABORTED)
             return
         handle = self._send(goal)
         with self._lock:
@@ -170,7 +162,7 @@ class OfferedGoals:
         assert result is not None
         if goal.jump and status is GoalStatus.CANCELED:
             refused = ACTIONS[goal.name].refused
-            self._answer(goal_id, goal.name, refused(JUMPS[refused], goal.jump), Status.ABORTED)
+            self._answer(goal_id, goal.name, refused(FAILURE_AND_JUMP[refused][1], goal.jump), Status.ABORTED)
         elif status is GoalStatus.CANCELED and not goal.is_cancel_asked:
             self._answer(goal_id, goal.name, result, Status.ABORTED)
         else:

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from mbf_abstract.outcomes import outcome_name
 from mbf_ros.rosbridge.navigation import ACTIONS
-from mbf_ros.rosbridge_robot.goals import FAILURES, JUMPS, OfferedGoals, in_finite_numbers
+from mbf_ros.rosbridge_robot.goals import FAILURE_AND_JUMP, OfferedGoals, in_finite_numbers
 
 
 def test_all_actions_have_an_outcome_for_each_end_that_navigation_does_not_know():
     for mapping in ACTIONS.values():
-        for outcomes in (FAILURES, JUMPS):
-            result = mapping.refused(outcomes[mapping.refused], "why")
+        for outcome in FAILURE_AND_JUMP[mapping.refused]:
+            result = mapping.refused(outcome, "why")
             assert not result.success and result.message == "why" and not outcome_name(result.outcome).isdigit()
 
 
