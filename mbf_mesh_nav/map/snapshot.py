@@ -117,6 +117,7 @@ class SnapshotSeries:
         self._missed: IntArray  # vertices that changed since the spare arrays were current
         self._changes: dict[int, IntArray] = {}  # version -> vertices that differ from the version before
         self._closed = np.zeros(topology.vertex_count, dtype=np.bool_)  # vertices in places to avoid
+        self._any_closed = False
 
     def begin(self, costs: CostArray, lethal: LethalArray, edge_cost_factor: float) -> MeshSnapshot:
         """Make a snapshot that has nothing to do with the one before; costs (V,), lethal (V,), see ``MeshSnapshot``."""
@@ -148,12 +149,12 @@ class SnapshotSeries:
     def close(self, closed: LethalArray) -> IntArray:
         """Make the vertices of a mask (V,) lethal in the snapshots to come; return those that were not, or no more."""
         changed = np.flatnonzero(closed != self._closed).astype(np.int32)
-        self._closed = closed
+        self._closed, self._any_closed = closed, bool(closed.any())
         return changed
 
     def _published(self, costs: CostArray, lethal: LethalArray, outdated: IntArray) -> MeshSnapshot:
         """Bring the current arrays up to date at the ``outdated`` vertices and show them."""
-        if self._closed.any():
+        if self._any_closed:
             lethal = lethal | self._closed
             lethal.flags.writeable = False  # as those of a layer: kernels know one type
         mesh, now = self._topology, self._current

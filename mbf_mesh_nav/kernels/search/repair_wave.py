@@ -12,17 +12,16 @@ from typing import Any
 import numpy as np
 
 from mbf_mesh_nav.arrays import Float32Array, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, kernel
-from mbf_mesh_nav.kernels.fill import fill
+from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
 from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph
 
-_AHEAD: Any = Index(16)  # places of a list, after which a vertex's edges will have come from memory
-_FAR_AHEAD: Any = Index(32)  # the same for where they stand, and for the field at its neighbours, which are near it
+_FAR_AHEAD: Any = Index(96)  # places of the list, after which it will be known where the edges of a vertex stand
+_AHEAD: Any = Index(64)  # the same for its edges
+_NEAR_AHEAD: Any = Index(32)  # the same for the field at its first and last neighbour; the others lie between them
 _LAST: Any = Index(5)  # of the edges of most vertices, which are six; asking for what lies behind the end does no harm
-_BESIDE: Any = np.uint8(1)
-_RESET: Any = np.uint8(2)
-_SEED: Any = np.uint8(3)
+_LISTED = -2  # as a predecessor: a changed vertex to which the walk has yet to come, or a root
+_NONE = -1
 
 
 @kernel
@@ -39,7 +38,7 @@ def invalidate_subtrees(
     Parameters
     ----------
     graph : SearchGraph
-        With the new weights and blocked vertices.
+        With the new weights and blocked vertices; no vertex is twice a neighbour of another.
     distances, predecessors : (V,) float32, (V,) int32
         The old field; reset vertices get inf and -1.
     roots, root_distances : (r,) int32, (r,) float32
@@ -50,21 +49,22 @@ def invalidate_subtrees(
     Returns
     -------
     seeds : (s,) int32
-        Reached vertices beside reset ones, and the roots among those.
+        Reached vertices beside reset ones, and the roots among those; some more than once.
     """
     reset = np.empty(len(distances) + 1, dtype=np.int32)
-    beside = np.empty(len(distances) + 1, dtype=np.int32)
-    seeds = np.empty(len(distances), dtype=np.int32)
-    state = np.empty(len(distances), dtype=np.uint8)
-    fill(state, Count(0))
-    count, beside_count, seed_count, reader = Index(0), Index(0), Index(0), Index(0)
+    beside = np.empty(len(graph.neighbours) + 1, dtype=np.int32)
+    count, beside_count, reader = Index(0), Index(0), Index(0)
     for changed_vertex in changed:
         vertex = Index(changed_vertex)
-        if state[vertex] == 0:
-            state[vertex] = _RESET
+        if predecessors[vertex] != _LISTED:
+            predecessors[vertex] = _LISTED
             reset[count] = vertex
             count += ONE
-    # 1. Reset the changed vertices and everything behind them, and list what lies beside.
+    for number in roots:
+        root = Index(number)
+        if predecessors[root] == _NONE:  # not if another root leads to it
+            predecessors[root] = _LISTED
+    # 1. Reset the changed vertices and everything behind them, and list what lies beside and is not reset yet.
     while reader < count:
         vertex = Index(reset[reader])
         reader += ONE
@@ -73,33 +73,39 @@ def invalidate_subtrees(
             prefetch(graph.offsets, ahead)
             prefetch(distances, ahead)
             prefetch(predecessors, ahead)
-            prefetch(state, ahead)
         if reader + _AHEAD < count:
             ahead = Index(graph.offsets[reset[reader + _AHEAD]])
             prefetch(graph.neighbours, ahead)
             prefetch(graph.neighbours, ahead + _LAST)
+        if reader + _NEAR_AHEAD < count:
+            ahead = Index(reset[reader + _NEAR_AHEAD])
+            first, end = Index(graph.offsets[ahead]), Index(graph.offsets[ahead + ONE])
+            if first < end:
+                prefetch(predecessors, Index(graph.neighbours[first]))
+                prefetch(predecessors, Index(graph.neighbours[end - ONE]))
         distances[vertex] = np.inf
-        predecessors[vertex] = -1
+        predecessors[vertex] = _NONE
         for slot in range(Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])):
             # To one list or the other, or to none, without a branch: written behind both, counted where it belongs.
             other = Index(graph.neighbours[slot])
-            is_child, before = Index(predecessors[other]) == vertex, state[other]
-            reset[count] = other
-            count += Index(is_child & (before != _RESET))
-            beside[beside_count] = other
-            beside_count += Index((not is_child) & (before == 0))
-            state[other] = _RESET if is_child else max(before, _BESIDE)
+            before = predecessors[other]
+            is_child = Index(before) == vertex
+            reset[count] = beside[beside_count] = other
+            count += Index(is_child)
+            beside_count += Index((not is_child) & (before != _NONE))
+    # 2. The wave starts again from the roots among them and from what stayed intact beside them.
+    seeds = np.empty(Index(len(roots)) + beside_count + ONE, dtype=np.int32)
+    seed_count = Index(0)
     for index in range(len(roots)):
         root = Index(roots[index])
-        if state[root] == _RESET and not graph.blocked[root]:
+        if predecessors[root] == _LISTED:
+            predecessors[root] = _NONE
+        if distances[root] == np.inf and not graph.blocked[root]:
             distances[root] = root_distances[index]
-            state[root] = _SEED
             seeds[seed_count] = root
             seed_count += ONE
-    # 2. The wave starts again from what is intact of that.
-    for index in range(beside_count):
-        other = Index(beside[index])
-        if state[other] == _BESIDE and distances[other] < np.inf:
-            seeds[seed_count] = other
-            seed_count += ONE
+    for place in range(beside_count):
+        other = Index(beside[place])
+        seeds[seed_count] = other
+        seed_count += Index(distances[other] < np.inf)
     return seeds[:seed_count].copy()
