@@ -37,6 +37,14 @@ def kernel(function: KernelFunction) -> KernelFunction:
     return cast(KernelFunction, compile_lazily(function, **_OPTIONS, _nrt=True))
 
 
+def brief_kernel(function: KernelFunction) -> KernelFunction:
+    """Compile a kernel of a few microseconds that Python calls between longer ones; it keeps the interpreter's lock.
+
+    Who gives the lock away may have to wait for it, and to be woken again takes longer than such a kernel.
+    """
+    return cast(KernelFunction, compile_lazily(function, **_OPTIONS, _nrt=True, nogil=False))
+
+
 def plain_kernel(function: KernelFunction) -> KernelFunction:
     """Compile a kernel that makes no array and returns none: nobody counts who holds the arrays that it is given.
 

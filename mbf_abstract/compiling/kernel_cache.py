@@ -76,7 +76,7 @@ def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
 
 
 def _stand_in(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    dispatcher = njit(**_OPTIONS, **options)(function)
+    dispatcher = njit(**{**_OPTIONS, **options})(function)
     if options.get("no_cpython_wrapper"):
         dispatcher.__class__ = StepDispatcher
     return dispatcher

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.compiling.decorators import Count, inner_kernel, kernel, plain_kernel
+from mbf_abstract.compiling.decorators import Count, brief_kernel, inner_kernel, kernel, plain_kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def headed_poses(points: FloatArray) -> FloatArray:
     return poses
 
 
-@kernel
+@brief_kernel
 def level_path(points: FloatArray, start_height: float, goal_height: float) -> tuple[FloatArray, FloatArray]:
     """Positions (n, 3) [m] over points (n, 2), rising evenly from one height to another, and level headings (n, 4).
 

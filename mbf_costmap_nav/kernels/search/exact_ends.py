@@ -7,13 +7,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.compiling.decorators import Count, kernel
+from mbf_abstract.compiling.decorators import Count, brief_kernel, kernel
 from mbf_costmap_nav.kernels.map.line_cells import cost_along
 
 FloatArray = NDArray[np.float64]
 
 
-@kernel
+@brief_kernel
 def with_exact_ends(
     cells: NDArray[np.uint8],
     unknown: int,
@@ -89,7 +89,7 @@ def _reversed(points: FloatArray) -> FloatArray:
     return turned
 
 
-@kernel
+@brief_kernel
 def cell_centres(indices: NDArray[np.int32], stride: int, geometry: FloatArray) -> FloatArray:
     """Centres (n, 2) [m] of the cells of flat padded indices (n,)."""
     centres = np.empty((len(indices), 2))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.compiling.decorators import Count, inner_kernel, kernel
+from mbf_abstract.compiling.decorators import Count, brief_kernel, inner_kernel, kernel
 from mbf_costmap_nav.kernels.search.padded_grid import SQRT2, PaddedGrid
 
 GRADIENT_STEP = 0.5
@@ -40,7 +40,7 @@ def best_predecessor(grid: PaddedGrid, g: NDArray[np.float32], cell: int, cut_co
     return best
 
 
-@kernel
+@brief_kernel
 def trace_cells(grid: PaddedGrid, g: NDArray[np.float32], end: int, cut_corners: bool) -> NDArray[np.int32]:
     """Follow the best predecessors from ``end``, a reached cell, to the source of ``g``.
 
