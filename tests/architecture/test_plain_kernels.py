@@ -6,7 +6,10 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-PLAIN, WITH_ARRAYS = {"plain_kernel", "inner_kernel", "inlined_kernel"}, {"kernel", "inner_array_kernel"}
+PLAIN, WITH_ARRAYS = (
+    {"plain_kernel", "inner_kernel", "inlined_kernel"},
+    {"kernel", "brief_kernel", "inner_array_kernel"},
+)
 MAKES_ARRAYS = {"empty", "zeros", "ones", "full", "arange", "array", "copy", "astype", "concatenate", "argsort", "sort"}
 
 

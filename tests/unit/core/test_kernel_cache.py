@@ -13,6 +13,7 @@ import pytest
 
 from mbf_abstract.compiling import kernel_cache
 from mbf_abstract.compiling.compilation import record_compilations
+from mbf_abstract.compiling.decorators import brief_kernel, kernel
 from mbf_abstract.compiling.garbage import NEW_OBJECTS
 from mbf_abstract.compiling.kernel_cache import compile_lazily
 
@@ -158,3 +159,12 @@ def test_a_step_that_is_called_from_python_is_an_error_that_names_it():
         with pytest.raises(TypeError, match="twice is a step of other kernels, call one of those"):
             twice(3)
         assert four_times(3) == 12
+
+
+def test_only_brief_kernels_keep_the_interpreters_lock():
+    def step(x):
+        return x + 1.0
+
+    assert kernel(step).targetoptions["nogil"]
+    assert not brief_kernel(step).targetoptions["nogil"]
+    assert brief_kernel(step)(1.0) == 2.0
