@@ -20,7 +20,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from mbf_abstract.compiling.kernel_cache import compile_lazily
-from mbf_abstract.compiling.passes import LoopCompiler
+from mbf_abstract.compiling.passes import WholeStepCompiler
 
 KernelFunction = TypeVar("KernelFunction", bound=Callable[..., Any])
 
@@ -29,7 +29,7 @@ Index: Any = np.uint64
 Count: Any = np.int64
 """Type of counters and codes handed on to other kernels."""
 
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "pipeline_class": LoopCompiler}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "pipeline_class": WholeStepCompiler}
 
 
 def kernel(function: KernelFunction) -> KernelFunction:

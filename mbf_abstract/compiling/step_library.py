@@ -85,15 +85,30 @@ class StepLibrary(KernelLibrary):
         return self.name, "bitcode", self._final_module.as_bitcode()
 
 
+class WholeStepLibrary(StepLibrary):
+    """Code of a step that is optimised as a whole before its callers are, with it in them."""
+
+    def _optimize_final_module(self) -> None:
+        KernelLibrary._optimize_final_module(self)
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
 class KernelLowering(NativeLowering):  # type: ignore[misc]
     """numba's step from its own code to the processor's, which steps of other kernels leave half-way."""
 
     lowering_class = KnownOperators
+    step_library: type[StepLibrary] = StepLibrary
 
     def run_pass(self, state: Any) -> bool:
         """Make the code of a function."""
-        kind = StepLibrary if state.flags.no_cpython_wrapper else KernelLibrary
+        kind = self.step_library if state.flags.no_cpython_wrapper else KernelLibrary
         state.library = kind(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return bool(super().run_pass(state))
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class WholeStepLowering(KernelLowering):
+    """The same, with steps that are optimised as a whole."""
+
+    step_library = WholeStepLibrary

@@ -7,7 +7,8 @@ import sys
 import numba
 import pytest
 
-from mbf_abstract.compiling.passes import LoopCompiler
+from mbf_abstract.compiling.passes import LoopCompiler, WholeStepCompiler
+from mbf_abstract.compiling.step_library import WholeStepLibrary
 
 OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True, "pipeline_class": LoopCompiler}
 
@@ -36,6 +37,14 @@ def test_a_kernel_runs_its_step_which_has_no_machine_code():
     with pytest.raises(ValueError, match="too great") as caught:
         sum_of_doubled(10)
     assert caught.value.args == ("too great", 4)
+
+
+def test_steps_may_be_optimised_as_a_whole():
+    options = OPTIONS | {"pipeline_class": WholeStepCompiler}
+    step = numba.njit(no_cpython_wrapper=True, **options)(doubled.py_func)
+    kernel = numba.njit(**options)(lambda number: step(number) + 1)
+    assert kernel(3) == 7
+    assert [type(overload.library) for overload in step.overloads.values()] == [WholeStepLibrary]
 
 
 @numba.njit(no_cpython_wrapper=True, **OPTIONS)
@@ -80,7 +89,8 @@ def test_a_step_may_call_itself_but_not_by_way_of_another_one():
 
 KERNELS = """
 from mbf_abstract.compiling.kernel_cache import compile_lazily
-from mbf_abstract.compiling.passes import LoopCompiler
+from mbf_abstract.compiling.passes import LoopCompiler, WholeStepCompiler
+from mbf_abstract.compiling.step_library import WholeStepLibrary
 def step(function):
     return compile_lazily(function, pipeline_class=LoopCompiler, no_cpython_wrapper=True)
 def kernel(function):
