@@ -85,8 +85,18 @@ class StepLibrary(KernelLibrary):
         return self.name, "bitcode", self._final_module.as_bitcode()
 
 
+class WholeKernelLibrary(KernelLibrary):
+    """Code of a kernel whose functions are optimised one by one, too."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        JITCodeLibrary._optimize_functions(self, ll_module)
+
+
 class WholeStepLibrary(StepLibrary):
     """Code of a step that is optimised as a whole before its callers are, with it in them."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        JITCodeLibrary._optimize_functions(self, ll_module)
 
     def _optimize_final_module(self) -> None:
         KernelLibrary._optimize_final_module(self)
@@ -97,11 +107,12 @@ class KernelLowering(NativeLowering):  # type: ignore[misc]
     """numba's step from its own code to the processor's, which steps of other kernels leave half-way."""
 
     lowering_class = KnownOperators
+    kernel_library: type[KernelLibrary] = KernelLibrary
     step_library: type[StepLibrary] = StepLibrary
 
     def run_pass(self, state: Any) -> bool:
         """Make the code of a function."""
-        kind = self.step_library if state.flags.no_cpython_wrapper else KernelLibrary
+        kind = self.step_library if state.flags.no_cpython_wrapper else self.kernel_library
         state.library = kind(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return bool(super().run_pass(state))
@@ -109,6 +120,7 @@ class KernelLowering(NativeLowering):  # type: ignore[misc]
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class WholeStepLowering(KernelLowering):
-    """The same, with steps that are optimised as a whole."""
+    """The same, with steps and kernels that are optimised function by function and as a whole."""
 
+    kernel_library = WholeKernelLibrary
     step_library = WholeStepLibrary

@@ -4,7 +4,6 @@ When to use: a good global path that is to be followed as it is, at little compu
 while it turns at its goal). Forward-only, reversing and turn-in-place robots. When not: obstacles that are not in the
 path - it stops before them (BLOCKED_PATH) and never drives around; that needs replanning, ``costmap.dwa`` or
 ``costmap.mppi``. It cuts corners by about look_ahead^2 / (8 * radius).
-
 Formula: pure pursuit (Coulter 1992), curvature = 2 y / L^2; the speeds are those of ``control.regulated_speed``.
 """
 
@@ -70,16 +69,17 @@ class RegulatedPurePursuitController(LeavesContacts, RegulatedFollower):
         result = self._checked(cycle, motions)
         if not self._at_goal and self._tight_places.drives_otherwise(cycle.tracker, motions[0], result.command):
             return self.compute_velocity_commands(request)
-        blocked = result.outcome == ExePathOutcome.BLOCKED_PATH
-        if blocked and self.tracker and self._tight_places.begin_next_stroke(self.tracker):
+        is_blocked = result.outcome == ExePathOutcome.BLOCKED_PATH
+        if is_blocked and self.tracker and self._tight_places.begin_next_stroke(self.tracker):
             return self.compute_velocity_commands(request)
         return result
 
     def _way_out(self, cycle: ControlCycle) -> Twist | None:
         """The motion that leads straight out of what is touched; None for a car, at the goal and where none does."""
-        if not self.rotates or self._turn_at_goal(cycle) is not None:
+        pose, concerns = cycle.request.pose, self.rotates and self.leaving.concerns(self.costmap, cycle.request.pose)
+        if not concerns or self._turn_at_goal(cycle) is not None:
             return None
-        gears, pose = Gears(self._backward(cycle), self.may_reverse, True), cycle.request.pose
+        gears = Gears(self._backward(cycle), self.may_reverse, True)
         asked = self._angle_left(cycle), lambda angle: self._turn(cycle, angle), gears
         out = self.leaving.command(self.costmap, pose, *asked, OnPath(cycle.tracker, pose, gears.backward))
         return out if out is None or out.vx == 0.0 else self._slowed(out, cycle.request.velocity)

@@ -119,7 +119,7 @@ class PathFollower(LeavesContacts, SurfaceFollower):
 
     def _way_out(self, pose: Pose) -> Twist | None:
         """The motion straight out of what the robot touches; None without one, or where it may drive on such ground."""
-        if self.parameters.cost_limit > FORBIDDEN_COST:
+        if self.parameters.cost_limit > FORBIDDEN_COST or not self.leaving.concerns(self.mesh_map, pose):
             return None
         bearing, _ = arc_to(pose, self._target())
         gears, on_path = Gears(reverses=self.may_reverse), OnPath(self._tracker, pose)

@@ -2,8 +2,7 @@
 
 When to use: a map backend without a controller of its own. When not: to drive around obstacles (it ends with
 BLOCKED_PATH; plan again while driving), on slopes: the controllers of the costmap and the mesh server do more.
-Before a tight place (``tight_places``) it creeps close along the path.
-Formula: pure pursuit (Coulter 1992), the arc through a point ahead on the path.
+Formula: pure pursuit (Coulter 1992), the arc through a point ahead on the path; before a tight place it is near.
 """
 
 from __future__ import annotations
@@ -124,11 +123,12 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
 
     def way_out(self, pose: Pose) -> Twist | None:
         """The motion straight out of what the robot touches at ``pose``, in the frame of the path; None without one."""
-        if (tracker := self._tracker) is None or self._turn_at_goal.is_turning:
+        tracker, there = self._tracker, self.on_map(pose)
+        if tracker is None or self._turn_at_goal.is_turning or not self.leaving.concerns(self.navigation_map, there):
             return None
         gears = Gears(self._backward(tracker), self.may_reverse)
         asked = self._angle_left(pose, tracker), self._turn, gears, OnPath(tracker, pose, gears.backward, self.on_map)
-        return self.leaving.command(self.navigation_map, self.on_map(pose), *asked)
+        return self.leaving.command(self.navigation_map, there, *asked)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the path has been driven to its end, and the pose is within both tolerances of it."""

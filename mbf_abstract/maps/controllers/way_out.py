@@ -43,8 +43,6 @@ CLEAR = 0.03
 """So far [m] it drives on straight once it touches nothing."""
 ELSEWHERE, TURNED = 0.1, 0.3
 """A robot that is so far [m, rad] from where it was asked last has been driven by somebody else."""
-
-
 SAME_PLACE = 0.2
 """A robot that begins anew within this [m] of where it began last has come back: every second time it turns first."""
 
@@ -78,6 +76,10 @@ class WayOut:
         self._free_at: Pose | None = None
         self._began: Pose | None = None
         self._turns_first = False
+
+    def concerns(self, navigation_map: NavigationMap, pose: Pose) -> bool:
+        """Whether a robot at ``pose``, in the frame of the map, touches something, or is not clear since it did."""
+        return self._last is not None or navigation_map.contact_depth(pose) > 0.0
 
     def command(
         self,
