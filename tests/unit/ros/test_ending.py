@@ -12,9 +12,9 @@ from mbf_ros.ending import Parent, shown_state, wait_for_ctrl_c
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows does not say when a parent is gone")
 @pytest.mark.parametrize("ignored", [False, True])
 def test_a_command_ends_with_its_parent_unless_it_is_to_outlive_it(monkeypatch, capsys, ignored):
-    parent, looks = Parent(), []
+    parent, looks, another = Parent(), [], os.getppid() + 1  # 1 would be the same one in a container
     parent.end_without()
-    monkeypatch.setattr(os, "getppid", lambda: 1)
+    monkeypatch.setattr(os, "getppid", lambda: another)
     monkeypatch.setattr(signal, "getsignal", lambda number: signal.SIG_IGN if ignored else signal.SIG_DFL)
 
     def look():
