@@ -1,7 +1,7 @@
 """Where grass stands the points are noisier, which is no disagreement about the ground."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from surveyed_ground import flat, ground
 
@@ -50,6 +50,7 @@ def patches_of(columns, rows, points):
 
 
 @settings(deadline=None, max_examples=20)
+@example(1281)
 @given(st.integers(0, 10_000))
 def test_the_median_of_a_place_is_that_of_its_block_and_the_eight_around_it(seed):
     rng = np.random.default_rng(seed)
@@ -64,8 +65,10 @@ def test_the_median_of_a_place_is_that_of_its_block_and_the_eight_around_it(seed
         around = used & (np.abs(across - across[patch]) <= 1) & (np.abs(up - up[patch]) <= 1)
         own = np.abs(distances[np.repeat(around, points)])
         own = own[np.isfinite(own)]
-        expected = np.median(own) if len(own) >= 100 else np.nanmedian(np.abs(distances))
-        assert abs(found[patch] - expected) <= width
+        if len(own) < 100:
+            assert found[patch] == np.nanmedian(np.abs(distances))
+        else:  # of an even number of points the lower of the two in the middle is in the bin whose middle is given
+            assert abs(found[patch] - np.quantile(own, 0.5, method="lower")) <= 0.5 * width * (1.0 + 1e-5)
 
 
 @settings(deadline=None, max_examples=20)
