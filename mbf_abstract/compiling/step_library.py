@@ -27,12 +27,28 @@ _ENVIRONMENT = "_ZN08NumbaEnv"
 """How the variables begin that hold the address of an environment, as in numba's own ``CompileResult``."""
 
 
+def _chosen_passes() -> Any:
+    """LLVM's passes of ``TIDYING``; None with an llvmlite of before 2025, which has none to choose from."""
+    manager: Any = getattr(llvm, "create_new_module_pass_manager", lambda: None)()
+    if not all(hasattr(manager, f"add_{name}_pass") for name in TIDYING):
+        return None
+    for name in TIDYING:
+        getattr(manager, f"add_{name}_pass")()
+    return manager
+
+
 class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Code of a kernel with all steps that it calls."""
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Leave out what numba does for each function of a module, and again when it optimises the whole module."""
-        ll_module.data_layout = self._codegen._data_layout
+        """Leave out what numba does for each function of a module, and again when it optimises the whole module.
+
+        An llvmlite of before 2025 makes other code of that.
+        """
+        if _chosen_passes() is None:
+            super()._optimize_functions(ll_module)
+        else:
+            ll_module.data_layout = self._codegen._data_layout
 
     def _finalize_specific(self) -> None:
         super()._finalize_specific()
@@ -55,17 +71,12 @@ class StepLibrary(KernelLibrary):
     codegen = _NoMachineCode()
 
     def _optimize_final_module(self) -> None:
-        """Leave to LLVM's whole optimisation of the callers what is not done by ``TIDYING``.
-
-        An llvmlite of before 2025 has no passes to choose from.
-        """
-        manager: Any = getattr(llvm, "create_new_module_pass_manager", lambda: None)()
-        if not all(hasattr(manager, f"add_{name}_pass") for name in TIDYING):
+        """Leave to LLVM's whole optimisation of the callers what is not done by ``TIDYING``."""
+        manager = _chosen_passes()
+        if manager is None:
             super()._optimize_final_module()
-            return
-        for name in TIDYING:
-            getattr(manager, f"add_{name}_pass")()
-        manager.run(self._final_module, self._codegen._pass_builder(opt=0))
+        else:
+            manager.run(self._final_module, self._codegen._pass_builder(opt=0))
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
