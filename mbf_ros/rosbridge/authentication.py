@@ -17,6 +17,7 @@ from mbf_ros.rosbridge.protocol import Operation, OperationError, frame, number_
 MAX_SKEW = 5  # s between the clocks of client and server
 MAX_TIME = 2**53
 REMEMBERED = 1000
+VALIDITY = 60  # s; of what a client proves
 
 
 class Authentication:
@@ -48,9 +49,6 @@ class Authentication:
                 self._used.append(code)
                 return role
         raise OperationError("auth: the code is wrong, too old, or was used before")
-
-
-VALIDITY = 60  # s
 
 
 def auth_frame(secret: str, now: Callable[[], float], rand: Callable[[], str]) -> str:
