@@ -14,18 +14,22 @@ from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.polyline import polyline_lengths, reverse_segments
 
 NEAR = 1.5
-"""A robot is in a manoeuvre where it changes gear within so much [m] of its path."""
+"""A robot is in a manoeuvre where its path, or the new one, changes gear within so much [m]."""
 
 
 def goes_on(followed: Path, to_go: float, new: Path) -> bool:
     """Whether to keep to a path with ``to_go`` [m] left rather than take one from where the robot is."""
     if to_go > new.length:
         return False
-    lengths, done = polyline_lengths(followed.positions), followed.length - to_go
+    near = np.concatenate([_gears(followed, followed.length - to_go), _gears(new, 0.0)])
+    return bool(near.any() and not near.all())
+
+
+def _gears(path: Path, done: float) -> np.ndarray:
+    """Whether a path is driven in reverse, for each segment within ``NEAR`` of ``done`` [m] along it."""
+    lengths = polyline_lengths(path.positions)
     here = max(int(np.searchsorted(lengths, done, side="right")) - 1, 0)
-    reverse = reverse_segments(followed, followed.positions)[here:]
-    gears = reverse[lengths[here:-1] <= done + NEAR]
-    return bool((gears != reverse_segments(new, new.positions)[:1]).any())
+    return reverse_segments(path, path.positions)[here:][lengths[here:-1] <= done + NEAR]
 
 
 def rest_of(path: Path, to_go: float) -> Path:

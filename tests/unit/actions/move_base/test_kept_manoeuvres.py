@@ -24,6 +24,7 @@ def along(*corners, step=0.1):
         (along(0, 1, -2), 3.5, along(0.5, 0.2, 4), True),  # it goes on to its cusp, 0.5 m ahead
         (along(0, 1, -2), 3.5, along(0.5, 1, -1.9), False),  # shorter
         (along(0, 1, -2), 2.5, along(0.5, 3.5), True),  # behind the cusp, and the new one goes ahead
+        (along(0, 1, -2), 2.5, along(0.5, 0, 4), True),  # behind the cusp, and the new one has another one soon
         (along(0, 1, -2), 2.5, along(0.5, -2.5), False),  # behind the cusp, in the same gear
         (along(0, 4, 3.5), 4.4, along(0.1, 4, 3.4), False),  # the cusp is far
         (along(0, 4), 3.9, along(0.1, -0.2, 4), True),
