@@ -13,7 +13,7 @@ from mbf_abstract.geometry import FloatArray
 from terrain.description.description import RobotDescription
 from terrain.description.masses import mass_of, notes_on_masses, some_of
 from terrain.description.mesh_files import find_file, missing_text
-from terrain.description.outline import Corner, convex_outline, surrounds_base, with_few_corners
+from terrain.description.outline import Corner, convex_outline, note_on_its_size, surrounds_base, with_few_corners
 from terrain.description.parameters import UrdfRobot
 from terrain.description.running_gear import RunningGear, note_on_its_side, sides_of, solids_of
 from terrain.description.solids import Placed
@@ -139,17 +139,18 @@ class _Describer:
             got = "none" if not outline else f"{len(outline)} points"
             raise self._refuse("footprint_heights", f"collision shapes between {low:g} and {high:g} m", got)
         few = [(_rounded(x), _rounded(y)) for x, y in with_few_corners(outline, self.stated.footprint_corners)]
+        self.notes += filter(None, [note_on_its_size(few)])
         if not surrounds_base(few):
             self.notes.append("base_link lies outside of its footprint, which a costmap refuses; state footprint")
         return few
 
     def _steered(self, wheelbase: float, track: float, steering: float) -> list[Placed]:
         """Shapes of steered wheels in the root link, at angles up to that of the inner wheel in the tightest curve."""
-        joints = {wheel.steering for wheel in self.gear.wheels if wheel.steering}
+        joints = [wheel.steering for wheel in self.gear.steered]
         if not joints or steering == 0.0:
             return []
         links = {link for name in joints for link in subtree(self.urdf, self.urdf.joints[name].child)}
-        inner = math.atan2(1.0, 1.0 / math.tan(steering) - 0.5 * track / wheelbase)
+        inner = math.atan2(1.0, 1.0 / math.tan(steering) - self.gear.steered_aside(track) / wheelbase)
         angles = np.linspace(-inner, inner, STEERED).tolist()
         frames = [link_frames(self.urdf, dict.fromkeys(joints, angle)) for angle in angles]
         return [solid for one in frames for solid in solids_of(self.urdf, one, links)]
@@ -192,7 +193,7 @@ class _Describer:
             return 0.0
         if self._wheelbase() <= 0.0:
             raise self._refuse("drive", "axles apart from each other, for a car", "one axle")
-        joints = [self.urdf.joints[wheel.steering] for wheel in self.gear.wheels if wheel.steering]
+        joints = [self.urdf.joints[wheel.steering] for wheel in self.gear.steered]
         limits = [min(abs(joint.lower), abs(joint.upper)) for joint in joints]
         wheel = min(limits)
         if math.isinf(wheel) or wheel == 0.0:
@@ -200,7 +201,7 @@ class _Describer:
             return self.stated.max_steering_angle or USUAL_STEERING_ANGLE
         # the inner wheel, which turns farthest, meets its limit first: cot(middle) = cot(inner) + track / (2 wheelbase)
         inner = 1.0 / math.tan(min(wheel, 1.4))
-        found = math.atan(1.0 / (inner + 0.5 * self._track() / self._wheelbase()))
+        found = math.atan(1.0 / (inner + self.gear.steered_aside(self._track()) / self._wheelbase()))
         return self.stated.max_steering_angle or _rounded(found)
 
     def _torque(self, mass: float, radius: float) -> float:

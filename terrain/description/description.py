@@ -1,7 +1,7 @@
 """``RobotDescription``: all that navigation and simulation need to know of a robot, see ``describe``.
 
 Lengths are in ``base_link`` as navigation has it: on the ground, x ahead; in the middle of the wheels, of a car in the
-middle of the rear ones; below the root link of a robot on legs.
+middle of those that are not steered; below the root link of a robot on legs.
 """
 
 from __future__ import annotations

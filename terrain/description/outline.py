@@ -11,6 +11,7 @@ from mbf_abstract.geometry import FloatArray
 
 Corner = tuple[float, float]
 SAME = 1e-6  # m; points nearer than this to a straight edge are no corners
+HUGE = 30.0  # m; no robot is longer
 PARALLEL = 1e-9  # cosine between a direction and the normal of an edge along it
 
 
@@ -69,6 +70,15 @@ def _apex(corners: list[Corner], k: int) -> tuple[Corner, float] | None:
     x, y = b[0] + along * ux, b[1] + along * uy
     area = 0.5 * abs((c[0] - b[0]) * (y - b[1]) - (c[1] - b[1]) * (x - b[0]))
     return (x, y), area
+
+
+def note_on_its_size(outline: list[Corner]) -> str:
+    """Say that a robot is as large as if its file were in millimetres, else ""; an outline of two or more corners."""
+    xs, ys = zip(*outline, strict=True)
+    size = max(max(xs) - min(xs), max(ys) - min(ys))
+    if size < HUGE:
+        return ""
+    return f"its footprint is {size:.0f} m long; a URDF is in metres, and this looks like millimetres"
 
 
 def reach(outline: list[Corner], point: Corner, direction: Corner) -> float:

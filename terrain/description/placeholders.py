@@ -6,6 +6,7 @@ left to where the robot tips over.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 
@@ -14,6 +15,7 @@ from terrain.description.description import RobotDescription
 from terrain.description.outline import footprint_radii
 
 PLACEHOLDER = re.compile(r"\$ROBOT_[A-Z_]*[A-Z]")
+SLOPES = ("$ROBOT_MAX_ROLL", "$ROBOT_MAX_PITCH_UP", "$ROBOT_MAX_PITCH_DOWN")
 MOTION_MODELS = {"ackermann": "ackermann", "omni": "omni", "legged": "omni"}
 DIGITS = 4
 
@@ -70,7 +72,7 @@ def fill_in(text: str, file: str, describe: Callable[[], RobotDescription]) -> s
     Raises
     ------
     ConfigError
-        There is no such placeholder, or the robot has no number for it.
+        There is no such placeholder, or the robot has no number for it, or it takes no slope in a direction asked for.
     """
     asked = sorted({match[0] for match in PLACEHOLDER.finditer(text)})
     if not asked:
@@ -78,10 +80,11 @@ def fill_in(text: str, file: str, describe: Callable[[], RobotDescription]) -> s
     robot = describe()
     values = robot_values(robot)
     lines = text.splitlines()
+    wrong = {name: _expected(robot, values) for name in asked if name not in values}
+    wrong |= {name: _steeper(robot) for name in SLOPES if name in asked and float(values.get(name, "1")) == 0.0}
     findings = [
-        Finding(file, number, "", _expected(robot, values), name, suggest(name, values))
-        for name in asked
-        if name not in values
+        Finding(file, number, "", expected, *((f"{name}, 0",) if name in values else (name, suggest(name, values))))
+        for name, expected in wrong.items()
         for number, line in enumerate(lines, 1)
         if name in PLACEHOLDER.findall(line)
     ]
@@ -92,6 +95,14 @@ def fill_in(text: str, file: str, describe: Callable[[], RobotDescription]) -> s
 
 def _expected(robot: RobotDescription, values: dict[str, str]) -> str:
     return f"a number that is known of {robot.urdf.name} ({robot.drive}): {', '.join(values)}"
+
+
+def _steeper(robot: RobotDescription) -> str:
+    """What a robot needs that takes no slope."""
+    assert robot.tipping is not None
+    least, margin = math.degrees(robot.tipping.least), math.degrees(robot.stated.tip_over_margin)
+    found = f"{robot.urdf.name} tips over at {least:.0f} degrees, tip_over_margin is {margin:.0f} degrees"
+    return f"a slope above 0 ({found}; is its center_of_mass right?)"
 
 
 def _text(value: float) -> str:

@@ -102,6 +102,15 @@ class RunningGear:
         straight = tuple(wheel for wheel in self.wheels if not wheel.steering)
         return straight or self.wheels
 
+    @property
+    def steered(self) -> tuple[Wheel, ...]:
+        """One wheel for each steering joint, from front left to rear right."""
+        return tuple({wheel.steering: wheel for wheel in self.wheels if wheel.steering}.values())
+
+    def steered_aside(self, track: float) -> float:
+        """How far [m] the steered wheels of a car lie from its middle: 0 for a single one."""
+        return 0.5 * track if len(self.steered) > 1 else 0.0
+
 
 def solids_of(urdf: Urdf, frames: Mapping[str, FloatArray], links: Collection[str]) -> list[Placed]:
     """Collision shapes of some links in the root link."""

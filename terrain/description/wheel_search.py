@@ -82,10 +82,18 @@ def find_running_gear(
     if drive not in ("omni", "legged") and not all(sides_of(gear.driven)):
         got = ", ".join(f"{wheel.joint} at y = {float(wheel.centre[1]):.2f} m" for wheel in gear.driven) or "none"
         raise ConfigError([Finding(str(urdf.file), 1, "drive", "driven wheels on the left and on the right", got)])
-    if drive == "ackermann" and len({wheel.steering for wheel in wheels} - {""}) != 2:
-        got = ", ".join(wheel.steering for wheel in wheels if wheel.steering) or "none"
-        raise ConfigError([Finding(str(urdf.file), 1, "drive", "two steered wheels, for a car", got)])
+    if drive == "ackermann":
+        _refuse_other_cars(urdf, gear)
     return gear
+
+
+def _refuse_other_cars(urdf: Urdf, gear: RunningGear) -> None:
+    """Raise ConfigError unless one wheel is steered, or two beside each other."""
+    places = ", ".join(f"{w.steering} at x = {float(w.centre[0]):.2f} m" for w in gear.steered) or "none"
+    xs = [float(wheel.centre[0]) for wheel in gear.steered]
+    if len(xs) not in (1, 2) or max(xs) - min(xs) > gear.steered[0].radius:
+        expected = "one steered wheel, or two beside each other, for a car"
+        raise ConfigError([Finding(str(urdf.file), 1, "drive", expected, places)])
 
 
 def _caster(urdf: Urdf, wheel: Wheel) -> Support:

@@ -1,8 +1,7 @@
 """Velocity commands to wheel speeds and back, for the three drives of ``terrain.physics.robot_models``; pure functions.
 
 Skid-steered and differential: left and right speed differ by yaw rate x effective track. Car: bicycle model, with the
-two front wheels turned so that all axles meet in one point (Ackermann), and the rear wheels at the speeds of their
-circles.
+steered wheels turned so that all axles meet in one point (Ackermann), and the others at the speeds of their circles.
 """
 
 from __future__ import annotations
@@ -19,7 +18,10 @@ MIN_STEERING_SPEED = 0.05  # m/s; a slower car that is asked for a yaw rate turn
 
 @dataclass(frozen=True)
 class WheelTargets:
-    """Speeds [rad/s] of the left and right driven wheels, angles [rad] of the left and right steered wheels."""
+    """Speeds [rad/s] of the left and right driven wheels, angles [rad] of the left and right steered wheels.
+
+    Both angles are that of the steered wheel where there is one.
+    """
 
     left: float = 0.0
     right: float = 0.0
@@ -68,17 +70,27 @@ def _car_targets(spec: RobotSpec, command: Command) -> WheelTargets:
     if isinstance(command, Twist):
         command = AckermannCommand(command.vx, steering_angle(spec, command))
     speed = _clip(command.speed, spec.max_speed) / spec.wheel_radius
-    curvature = math.tan(_clip(command.steering_angle, spec.max_steering_angle)) / spec.wheelbase
+    angle = _clip(command.steering_angle, spec.max_steering_angle)
+    curvature = math.tan(angle) / spec.wheelbase
     inner, outer = (
         1.0 - 0.5 * spec.track * curvature,
         1.0 + 0.5 * spec.track * curvature,
     )  # left, right if curvature > 0
-    return WheelTargets(
-        speed * inner,
-        speed * outer,
-        math.atan(spec.wheelbase * curvature / inner),
-        math.atan(spec.wheelbase * curvature / outer),
-    )
+    if len(spec.steering) == 1:
+        left, right = angle, angle
+    else:
+        left = math.atan(spec.wheelbase * curvature / inner)
+        right = math.atan(spec.wheelbase * curvature / outer)
+    way = -1.0 if spec.steers_behind else 1.0
+    return WheelTargets(speed * inner, speed * outer, way * left, way * right)
+
+
+def bicycle_angle(wheels: list[float]) -> float:
+    """Bicycle steering angle [rad] of one steered wheel, or of two, whose circles lie half a track beside its own."""
+    slopes = [math.tan(wheel) for wheel in wheels]
+    if min(slopes) * max(slopes) <= 0.0:  # ahead, or about to be
+        return math.atan(sum(slopes) / len(slopes))
+    return math.atan(len(slopes) / sum(1.0 / slope for slope in slopes))
 
 
 def commanded_twist(spec: RobotSpec, command: Command) -> Twist:

@@ -41,7 +41,9 @@ class RobotSpec:
     left_wheels, right_wheels : tuple of str
         Driven joints.
     steering : tuple of str
-        Left and right steering joint of a car, else empty.
+        Left and right steering joint of a car, or that of its single steered wheel; else empty.
+    steers_behind : bool
+        Whether a car's steered wheels lie behind its other axle, as those of a forklift: they turn the other way.
     track, wheelbase : float
         Distance between left and right wheels, and between axles [m]; wheelbase 0 for a single axle.
     track_multiplier : float
@@ -79,6 +81,7 @@ class RobotSpec:
     motor_torque: float
     lidar_position: tuple[float, float, float]
     steering: tuple[str, ...] = ()
+    steers_behind: bool = False
     max_steering_angle: float = 0.0
     track_multiplier: float = 1.0
     wheel_friction: tuple[float, float, float] = (1.0, 1.0, 1.0)

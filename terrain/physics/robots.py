@@ -7,7 +7,6 @@ may call from any thread. As on a real robot, the motors stop when no command ar
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import AckermannCommand, Command, Pose, Twist, Vector3, rotation_matrix
 from mbf_abstract.geometry.arithmetic import cross_product, rotated, rotated_back
 from terrain.physics.bullet import quiet_native_output
-from terrain.physics.drive import STEERING_SPEED, commanded_twist, twist_from_wheels, wheel_targets
+from terrain.physics.drive import STEERING_SPEED, bicycle_angle, commanded_twist, twist_from_wheels, wheel_targets
 from terrain.physics.motion_sample import MotionSample, Thing
 from terrain.physics.robot_models import Drive, RobotSpec
 from terrain.physics.world import ROBOT, BulletWorld
@@ -196,7 +195,8 @@ class WheeledRobot:
             return 0.0
         joints = [self._joints[name] for name in self.spec.steering]
         states = self._bullet.getJointStates(self.body, joints)
-        return math.atan(0.5 * sum(math.tan(state[0]) for state in states))
+        angle = bicycle_angle([state[0] for state in states])
+        return -angle if self.spec.steers_behind else angle
 
     def rolling_velocity(self) -> Twist:
         """Motion of the base if the wheels did not slip."""

@@ -130,7 +130,7 @@ def _spec(robot: RobotDescription) -> RobotSpec:
     xs, ys = zip(*robot.footprint, strict=True)
     top = (0.5 * (min(xs) + max(xs)), 0.5 * (min(ys) + max(ys)), robot.height + OVER_THE_TOP)
     places = np.array([wheel.centre - robot.p_root_base for wheel in robot.gear.wheels]).reshape(-1, 3)
-    steered = [wheel for wheel in robot.gear.wheels if wheel.steering]  # the left one first
+    steered = robot.gear.steered  # the left one first
     drive = DRIVES[robot.drive]
     return RobotSpec(
         name=robot.urdf.name,
@@ -150,6 +150,7 @@ def _spec(robot: RobotDescription) -> RobotSpec:
         motor_torque=robot.motor_torque,
         lidar_position=robot.stated.lidar_position or top,
         steering=tuple(wheel.steering for wheel in steered) if drive is Drive.ACKERMANN else (),
+        steers_behind=drive is Drive.ACKERMANN and bool(steered[0].centre[0] < robot.p_root_base[0]),
         max_steering_angle=robot.max_steering_angle,
         track_multiplier=robot.track_multiplier,
         wheel_friction=SCRUBBING if drive is Drive.SKID_STEER else (1.0, 1.0, 1.0),

@@ -41,6 +41,14 @@ FOUR_WHEELS = [
     for end, x in (("front", 0.3), ("rear", -0.3))
     for side, y in (("left", 0.35), ("right", -0.35))
 ]
+FIXED_AXLE = [wheel(side, "body", f"0 {y} 0") for side, y in (("left", 0.35), ("right", -0.35))]
+
+
+def steered(name, x, y):
+    """A wheel that turns by 0.6 rad each way on an upright joint."""
+    limits = '<limit lower="-0.6" upper="0.6" effort="5" velocity="3"/>'
+    hinge = joint(f"{name}_steer", "body", f"{name}_hinge", f"{x} {y} 0", "revolute", "0 0 1", limits)
+    return [link(f"{name}_hinge", 0.1), hinge, wheel(name, f"{name}_hinge", "0 0 0")]
 
 
 @pytest.fixture

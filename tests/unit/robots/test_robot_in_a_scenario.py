@@ -21,7 +21,7 @@ from terrain.scenarios.scenario import load_scenario
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.urdf_robots.omni_robot import OmniRobot
 from terrain.urdf_robots.robot_choice import description_of, simulated_spec, spec_of
-from tests.unit.robots.conftest import BODY, FOUR_WHEELS, KIWI, link, package_file, robot
+from tests.unit.robots.conftest import BODY, FIXED_AXLE, FOUR_WHEELS, KIWI, link, package_file, robot, steered
 
 EXAMPLES = KIWI.parent
 SCENARIO = """
@@ -83,7 +83,7 @@ def test_a_text_and_a_block_name_the_same_robot_beside_the_scenario(scenario, tm
         ),
         ("{urdf: my.urdf, max_sped: 1.0}", "did you mean 'max_speed'?"),
         ("{urdf: my.urdf, wheels: [front_lefd]}", "did you mean 'front_left'?"),
-        ("{urdf: my.urdf, drive: ackermann}", "expected two steered wheels"),
+        ("{urdf: my.urdf, drive: ackermann}", "expected one steered wheel, or two beside each other"),
         ("{drive: skid}", "robot.urdf: expected a value, got nothing"),
         ("{urdf: my.urdf, drive: legged}", "physics: expected kinematic, for a robot on legs"),
     ],
@@ -101,6 +101,16 @@ def test_placeholders_stand_for_the_numbers_of_the_robot(described):
     values = yaml.safe_load(text)
     assert (values["a"], [tuple(corner) for corner in values["b"]]) == (0.7, found.footprint)
     assert values["c"] == pytest.approx(0.5 * (0.45 + found.tipping.least), abs=1e-4)
+
+
+def test_a_slope_that_the_robot_cannot_take_is_refused_where_it_is_asked_for(described):
+    found = described(robot(BODY, *FOUR_WHEELS), center_of_mass=(-0.298, 0.0, 0.2))
+    with pytest.raises(ConfigError) as caught:
+        fill_in("tilt:\n  max_roll: $ROBOT_MAX_ROLL\n  max_pitch_up: $ROBOT_MAX_PITCH_UP\n", "nav.yaml", lambda: found)
+    assert str(caught.value) == (
+        "nav.yaml:3: expected a slope above 0 (hand_made tips over at 1 degrees, tip_over_margin is 9 degrees; "
+        "is its center_of_mass right?), got $ROBOT_MAX_PITCH_UP, 0"
+    )
 
 
 def test_limits_of_slope_keep_a_margin_to_where_the_robot_tips_over(described):
@@ -194,6 +204,20 @@ def test_a_car_of_others_turns_on_the_circle_of_its_steering(tmp_path):
     with world:
         velocity = driven(world, made, AckermannCommand(0.5, 0.3))
     assert velocity.wz / velocity.vx == pytest.approx(np.tan(0.3) / 0.325, rel=0.05)
+
+
+@pytest.mark.parametrize("x", [0.5, -0.5])  # a tricycle; a forklift
+@pytest.mark.parametrize("ys", [[0.0], [0.35, -0.35]])
+def test_steered_wheels_ahead_or_behind_one_or_two_turn_a_robot_as_commanded(write, tmp_path, x, ys):
+    wheels = [part for k, y in enumerate(ys) for part in steered(f"steered_{k}", x, y)]
+    text = robot(BODY, *FIXED_AXLE, *wheels).replace('mass value="6.0"', 'mass value="30.0"')
+    choice = UrdfRobot(urdf=str(write(text)), max_speed=1.0, center_of_mass=(0.5 * x, 0.0, 0.2))
+    world, made = on_flat_ground(choice, tmp_path)
+    with world:
+        velocity = driven(world, made, Twist.planar(0.5, 0.0, 0.3))
+        believed = made.rolling_velocity()
+    assert velocity.wz / velocity.vx == pytest.approx(0.6, rel=0.07)
+    assert believed.wz / believed.vx == pytest.approx(0.6, rel=0.01)
 
 
 def test_an_omnidirectional_robot_moves_sideways_and_turns_as_commanded(tmp_path):

@@ -15,6 +15,7 @@ from terrain.physics.robot_models import CAR, HUSKY, TURTLEBOT
 from tests.unit.robots.conftest import (
     BODY,
     CYLINDER,
+    FIXED_AXLE,
     FOUR_WHEELS,
     KIWI,
     SHIPPED,
@@ -22,6 +23,7 @@ from tests.unit.robots.conftest import (
     link,
     package_file,
     robot,
+    steered,
     wheel,
 )
 
@@ -252,6 +254,14 @@ def test_three_wheels_in_a_star_move_any_way():
 def test_wheels_that_roll_sideways_are_an_error_that_names_them():
     with pytest.raises(ConfigError, match=r"right_front_wheel_joint: axis: expected an axis along y"):
         describe(package_file("r2d2.urdf"))
+
+
+@pytest.mark.parametrize("x", [0.6, -0.6])
+def test_a_single_steered_wheel_makes_a_car_that_turns_as_far_as_its_wheel(described, x):
+    found = described(robot(BODY, *FIXED_AXLE, *steered("tiller", x, 0.0)))
+    assert (found.drive, found.gear.steered[0].steering) == ("ackermann", "tiller_steer")
+    assert found.max_steering_angle == pytest.approx(0.6)
+    assert found.min_turning_radius == pytest.approx(0.6 / math.tan(0.6))
 
 
 def test_a_robot_that_hardly_stands_is_told_and_no_limit_of_it_is_below_zero(described):

@@ -40,7 +40,7 @@ def test_the_picture_is_an_image(tmp_path):
         (["nothing.urdf"], "urdf: expected a file"),
         ([SHIPPED / "husky.urdf", "--set", "max_sped=1"], "did you mean 'max_speed'?"),
         ([SHIPPED / "husky.urdf", "--set", "max_speed"], "expected KEY=VALUE"),
-        ([SHIPPED / "husky.urdf", "--set", "drive=ackermann"], "expected two steered wheels"),
+        ([SHIPPED / "husky.urdf", "--set", "drive=ackermann"], "expected one steered wheel"),
         ([SHIPPED / "husky.urdf", "--set", "footprint=[[0, 0], [0, 1], [1, 0]]"], "counter-clockwise"),
         ([SHIPPED / "husky.urdf", "--set", "footprint_heights=[1, 0.5]"], "the lower height first"),
     ],

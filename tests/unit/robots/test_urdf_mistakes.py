@@ -7,7 +7,7 @@ import trimesh
 from mbf_abstract.config.findings import ConfigError
 from terrain.description.describe import describe
 from terrain.description.parameters import UrdfRobot
-from tests.unit.robots.conftest import BODY, FOUR_WHEELS, joint, link, robot
+from tests.unit.robots.conftest import BODY, FIXED_AXLE, FOUR_WHEELS, joint, link, robot, steered, wheel
 
 BOX = '<geometry><box size="1 1 1"/></geometry>'
 MISTAKES = {
@@ -135,8 +135,22 @@ def test_a_named_wheel_that_is_none_is_refused_with_those_that_are(described):
 
 
 def test_a_car_needs_steered_wheels(described):
-    with pytest.raises(ConfigError, match="drive: expected two steered wheels, for a car, got none"):
+    with pytest.raises(ConfigError, match="one steered wheel, or two beside each other, for a car, got none"):
         described(robot(BODY, *FOUR_WHEELS), drive="ackermann")
+
+
+def test_wheels_steered_one_behind_the_other_make_no_car(described):
+    ends = [part for name, x in (("front", 0.5), ("rear", -0.5)) for part in steered(name, x, 0.0)]
+    with pytest.raises(ConfigError, match=r"got front_steer at x = 0\.50 m, rear_steer at x = -0\.50 m"):
+        described(robot(BODY, *FIXED_AXLE, *ends))
+
+
+def test_a_file_in_millimetres_is_told_that_a_urdf_is_in_metres(described):
+    shape = '<origin xyz="0 0 -150"/><geometry><box size="1000 400 20"/></geometry>'
+    wheels = [wheel(side, "body", f"0 {y} 0", radius=200) for side, y in (("left", 350), ("right", -350))]
+    notes = described(robot(link("body", 6.0, shape, "0 0 200"), *wheels)).notes
+    assert "its footprint is 1000 m long; a URDF is in metres, and this looks like millimetres" in notes
+    assert not any("millimetres" in note for note in described(robot(BODY, *FOUR_WHEELS)).notes)
 
 
 def test_an_origin_that_cannot_be_read_is_a_note_where_nothing_solid_hangs_on_it(described):

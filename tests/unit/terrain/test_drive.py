@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import AckermannCommand, Twist
-from terrain.physics.drive import commanded_twist, steering_angle, twist_from_wheels, wheel_targets
+from terrain.physics.drive import bicycle_angle, commanded_twist, steering_angle, twist_from_wheels, wheel_targets
 from terrain.physics.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpec
 
 
@@ -28,6 +28,7 @@ def test_all_axles_of_a_car_meet_in_one_point(speed: float, angle: float) -> Non
         left = CAR.wheelbase / math.tan(targets.steering_left) + 0.5 * CAR.track
         right = CAR.wheelbase / math.tan(targets.steering_right) - 0.5 * CAR.track
         assert left == pytest.approx(CAR.wheelbase / math.tan(angle)) and right == pytest.approx(left)
+    assert bicycle_angle([targets.steering_left, targets.steering_right]) == pytest.approx(angle, abs=1e-12)
 
 
 def test_commands_are_clipped_to_the_limits() -> None:
