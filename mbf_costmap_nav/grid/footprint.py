@@ -29,6 +29,8 @@ OUTLINES_KEPT = 32
 CIRCLE_POINTS = 16
 AS_A_CIRCLE = 1.02
 """An outline whose radii differ by no more than this factor, which is that of 16 corners, stands for a circle."""
+FARTHEST_CORNER = 1e6
+"""[m] along x and y; whatever unit was meant, squares of it do not overflow."""
 MITRE_LIMIT = 2.0
 """A corner of an offset outline may stick out by this factor of the distance; sharper ones are cut off flat."""
 
@@ -49,7 +51,7 @@ class Footprint:
     Raises
     ------
     ValueError
-        The vertices are not an (n, 2) array of finite numbers.
+        The vertices are not an (n, 2) array of finite numbers, or farther away than FARTHEST_CORNER.
     """
 
     __slots__ = ("circumscribed_radius", "inscribed_radius", "vertices")
@@ -60,6 +62,8 @@ class Footprint:
             points = points.reshape(0, 2)
         if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
             raise ValueError(f"a list of finite [x, y] points, not one of shape {points.shape}")
+        if (np.abs(points) > FARTHEST_CORNER).any():
+            raise ValueError(f"corners within {FARTHEST_CORNER:g} m of the base, not {np.abs(points).max():g} m away")
         points.flags.writeable = False
         self.vertices: FloatArray = points
         self.inscribed_radius, self.circumscribed_radius = _radii(points)

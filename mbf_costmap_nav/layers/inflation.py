@@ -85,8 +85,10 @@ class InflationLayer(CostmapLayer):
         radius = max(self.parameters.inflation_radius, self._inscribed_radius)
         self._radius = math.ceil(radius / self.geometry.resolution)
         if self._radius > LARGEST_RADIUS:
+            of_robot = radius > self.parameters.inflation_radius
+            name = "the robot's inscribed radius" if of_robot else "inflation_radius"
             raise ValueError(
-                f"layer {self.name!r}: inflation_radius is {self._radius} cells of {self.geometry.resolution:g} m, "
+                f"layer {self.name!r}: {name} is {self._radius:g} cells of {self.geometry.resolution:g} m, "
                 f"at most {LARGEST_RADIUS} are possible"
             )
         self._cost_of_square = cost_table(

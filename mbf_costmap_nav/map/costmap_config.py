@@ -46,7 +46,7 @@ class CostmapParameters(ParameterModel):
     resolution: float = parameter(0.1, "Side of a cell.", unit="m", ge=1e-4, le=1e3, dynamic=False)
     origin_x: float = parameter(0.0, "X of the lower-left corner.", unit="m", dynamic=False)
     origin_y: float = parameter(0.0, "Y of the lower-left corner.", unit="m", dynamic=False)
-    robot_radius: float = parameter(0.46, "Radius of a round robot; a footprint replaces it.", unit="m", ge=0.0)
+    robot_radius: float = parameter(0.46, "Radius of a round robot; a footprint replaces it.", unit="m", ge=0.0, le=1e6)
     footprint: str | list[tuple[float, float]] | None = parameter(
         None, "Corners of the robot, [[x, y], ...] or the same as text.", unit="m"
     )

@@ -20,6 +20,7 @@ from mbf_costmap_nav.map.costmap_config import CostmapParameters
         ([(1, 0), (0, 0), (-1, 0)], "area"),
         ([(0, 0), (0, 0), (0, 0)], "area"),
         ([(1, 1), (2, 1), (2, 2), (1, 2)], "lies outside"),
+        ([(1e300, 0), (0, 1e300), (-1, -1)], r"within 1e\+06 m of the base, not 1e\+300 m"),
     ],
 )
 def test_what_is_no_outline_around_the_base_is_refused(corners, reason):
