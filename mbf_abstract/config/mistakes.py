@@ -5,6 +5,7 @@ The errors of configuration files and those of changes at run time are made of t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, get_args
 
@@ -39,6 +40,7 @@ _NUMBER_ERRORS = {
     "less_than",
     "less_than_equal",
 }
+_SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
 
 @dataclass(frozen=True)
@@ -76,11 +78,16 @@ def mistakes_of(model: type[BaseModel], block: object, errors: list[ErrorDetails
     return [mistake for loc, mistake in found.items() if loc not in inside]
 
 
-def describe_range(field: FieldInfo) -> str:
-    """Return a field's legal range and unit as text, e.g. ``> 0 and <= 5 m``; empty if it has neither."""
+def describe_range(field: FieldInfo, broken: Mapping[str, float] | None = None) -> str:
+    """Return a field's legal range and unit as text, e.g. ``> 0 and <= 5 m``; empty if it has neither.
+
+    A field of several numbers has no range of its own: then that of the number that is wrong, as ``broken`` names it,
+    e.g. ``{"gt": 0.0}``.
+    """
     bounds = []
-    for name, sign in (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<=")):
+    for name, sign in _SIGNS.items():
         bounds += [f"{sign} {getattr(part, name):g}" for part in field.metadata if hasattr(part, name)]
+    bounds = bounds or [f"{_SIGNS[name]} {bound:g}" for name, bound in (broken or {}).items() if name in _SIGNS]
     extra = field.json_schema_extra
     unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
     if not bounds:
@@ -109,7 +116,7 @@ def _mistake_of_tag(error: ErrorDetails, loc: KeyPath) -> Mistake:
 
 def _expected(model: type[BaseModel], error: ErrorDetails, loc: KeyPath) -> str:
     field = _field_at(model, loc)
-    limits = describe_range(field) if field is not None else ""
+    limits = describe_range(field, error.get("ctx")) if field is not None else ""
     if error["type"] in _NUMBER_ERRORS:
         whole = error["type"].startswith("int") or (field is not None and field.annotation is int)
         number = "a whole number" if whole else "a finite number" if error["type"] == "finite_number" else "a number"

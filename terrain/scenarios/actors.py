@@ -35,8 +35,8 @@ class Walker(ParameterModel):
     route: tuple[tuple[float, float], ...] = parameter(..., "Corners; the last leg leads back to the first.", unit="m")
     speed: float = parameter(0.8, "Walking speed.", unit="m/s", ge=0.0, le=5.0)
     start: float = parameter(0.0, "How far along the route it starts.", unit="m", ge=0.0)
-    radius: float = parameter(PERSON_RADIUS, "Of the upright cylinder it is.", unit="m", gt=0.0)
-    height: float = parameter(PERSON_HEIGHT, "Of the upright cylinder it is.", unit="m", gt=0.0)
+    radius: float = parameter(PERSON_RADIUS, "Of the upright cylinder it is.", unit="m", gt=0.0, le=10_000.0)
+    height: float = parameter(PERSON_HEIGHT, "Of the upright cylinder it is.", unit="m", gt=0.0, le=10_000.0)
     blind: bool = parameter(
         False, "Follow the route at constant speed and push what is in the way, instead of yielding as people do."
     )

@@ -21,7 +21,7 @@ class Ridge(ParameterModel):
     type: Literal["ridge"]
     points: PlanarLine = parameter(..., "Corners of its crest.", unit="m")
     height: float = parameter(..., "Of the crest above the ground; below 0 it is a trench.", unit="m")
-    width: float = parameter(..., "From foot to foot.", unit="m", gt=0.0)
+    width: float = parameter(..., "From foot to foot.", unit="m", gt=0.0, le=10_000.0)
 
 
 class Crater(ParameterModel):
@@ -30,8 +30,8 @@ class Crater(ParameterModel):
     type: Literal["crater"]
     x: float = parameter(..., "Position of its middle.", unit="m")
     y: float = parameter(..., "Position of its middle.", unit="m")
-    radius: float = parameter(..., "From the middle to the crest of the rim.", unit="m", gt=0.0)
-    depth: float = parameter(..., "Of the bowl below the ground.", unit="m", gt=0.0)
+    radius: float = parameter(..., "From the middle to the crest of the rim.", unit="m", gt=0.0, le=10_000.0)
+    depth: float = parameter(..., "Of the bowl below the ground.", unit="m", gt=0.0, le=10_000.0)
     rim: float | None = parameter(None, "Of the crest above the ground; absent = a fifth of the depth.", unit="m")
 
 
@@ -40,9 +40,9 @@ class Ruts(ParameterModel):
 
     type: Literal["ruts"]
     points: PlanarLine = parameter(..., "Corners of the line in their middle.", unit="m")
-    track: float = parameter(1.5, "Distance of the ruts.", unit="m", gt=0.0)
-    width: float = parameter(0.4, "Of one rut.", unit="m", gt=0.0)
-    depth: float = parameter(0.15, "Of the ruts.", unit="m", gt=0.0)
+    track: float = parameter(1.5, "Distance of the ruts.", unit="m", gt=0.0, le=10_000.0)
+    width: float = parameter(0.4, "Of one rut.", unit="m", gt=0.0, le=10_000.0)
+    depth: float = parameter(0.15, "Of the ruts.", unit="m", gt=0.0, le=10_000.0)
 
 
 class Road(ParameterModel):
@@ -50,8 +50,8 @@ class Road(ParameterModel):
 
     type: Literal["road"]
     points: tuple[tuple[float, float, float], ...] = parameter(..., "Corners of its middle with heights.", unit="m")
-    width: float = parameter(3.0, "Of the level part.", unit="m", gt=0.0)
-    shoulder: float = parameter(1.0, "Over which it fades into the ground on each side.", unit="m", gt=0.0)
+    width: float = parameter(3.0, "Of the level part.", unit="m", gt=0.0, le=10_000.0)
+    shoulder: float = parameter(1.0, "Over which it fades into the ground on each side.", unit="m", gt=0.0, le=10_000.0)
 
 
 class Boulders(ParameterModel):
@@ -59,8 +59,8 @@ class Boulders(ParameterModel):
 
     type: Literal["boulders"]
     density: float = parameter(5.0, "Boulders on 100 square metres.", ge=0.0, le=200.0)
-    radius_min: float = parameter(0.1, "Smallest radius.", unit="m", gt=0.0)
-    radius_max: float = parameter(0.8, "Largest radius.", unit="m", gt=0.0)
+    radius_min: float = parameter(0.1, "Smallest radius.", unit="m", gt=0.0, le=10_000.0)
+    radius_max: float = parameter(0.8, "Largest radius.", unit="m", gt=0.0, le=10_000.0)
 
 
 class Steps(ParameterModel):
@@ -68,8 +68,8 @@ class Steps(ParameterModel):
 
     type: Literal["steps"]
     x: float = parameter(..., "Where the first step rises.", unit="m")
-    height: float = parameter(0.15, "Of a step.", unit="m", gt=0.0)
-    length: float = parameter(1.0, "Of a step.", unit="m", gt=0.0)
+    height: float = parameter(0.15, "Of a step.", unit="m", gt=0.0, le=10_000.0)
+    length: float = parameter(1.0, "Of a step.", unit="m", gt=0.0, le=10_000.0)
     count: int = parameter(1, "Number of steps.", ge=1, le=1000)
 
 

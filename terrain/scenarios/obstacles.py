@@ -16,7 +16,7 @@ from terrain.worlds.surface import Surface, box, cylinder, joined
 
 DRAWS_PER_POST = 100
 
-Length = Annotated[float, Field(gt=0.0)]
+Length = Annotated[float, Field(gt=0.0, le=10_000.0)]
 Size = tuple[Length, Length, Length]
 
 
@@ -36,9 +36,9 @@ class Forest(ParameterModel):
     x_range: tuple[float, float] = parameter(..., "Where it begins and ends along x.", unit="m")
     y_range: tuple[float, float] = parameter(..., "Where it begins and ends along y.", unit="m")
     count: int = parameter(30, "Number of posts; fewer if there is no room.", ge=0, le=10_000)
-    gap: float = parameter(2.0, "Least distance between the middles of two posts.", unit="m", gt=0.0)
-    diameter: float = parameter(0.3, "Of a post.", unit="m", gt=0.0)
-    height: float = parameter(1.5, "Of a post.", unit="m", gt=0.0)
+    gap: float = parameter(2.0, "Least distance between the middles of two posts.", unit="m", gt=0.0, le=10_000.0)
+    diameter: float = parameter(0.3, "Of a post.", unit="m", gt=0.0, le=10_000.0)
+    height: float = parameter(1.5, "Of a post.", unit="m", gt=0.0, le=10_000.0)
 
     def posts(self, rng: np.random.Generator, keep_clear: FloatArray) -> list[Obstacle]:
         """Draw the posts, none nearer than the gap to the places ``keep_clear`` (n, 2) [m] or to another post."""

@@ -20,11 +20,9 @@ from scipy import ndimage
 
 from mbf_abstract.config.bounded_files import read_arrays
 from terrain.worlds.generate import add_roughness
-from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.heightfield import MAX_SAMPLES, Heightfield
 
 METRES_PER_DEGREE = 111_320.0  # along a meridian, and along the equator; good to half a percent everywhere
-MAX_SAMPLES = 20_000_000
-"""How many heights are read unless a caller asks for more; absurd headers are refused before memory is asked for."""
 MAX_VOID_SHARE = 0.5
 
 ASCII_VOID = -9999.0

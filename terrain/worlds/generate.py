@@ -16,14 +16,14 @@ from numpy.typing import ArrayLike
 
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import exp, power, tan
-from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.heightfield import Heightfield, samples
 
 CLEAR_RADIUS = 2.0  # m around start and goals without boulders
 
 
 def flat_terrain(size_x: float, size_y: float, spacing: float, x0: float = 0.0, y0: float = 0.0) -> Heightfield:
     """Level ground at height 0 with about ``spacing`` [m] between samples."""
-    nx, ny = round(size_x / spacing) + 1, round(size_y / spacing) + 1
+    nx, ny = samples(size_x, size_y, spacing)
     return Heightfield(np.zeros((ny, nx), np.float32), size_x / (nx - 1), size_y / (ny - 1), x0, y0)
 
 

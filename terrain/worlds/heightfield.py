@@ -21,6 +21,19 @@ from terrain.worlds.surface import Surface, height_grid
 
 SMOOTHING_WIDTH = 0.5  # m; four sigma of the Gaussian that parts hills from bumps, about a wheelbase
 EDGE_TOLERANCE = 1e-9  # cells; a query on the far border must not fall off by a rounding error
+MAX_SAMPLES = 20_000_000  # unless a caller asks for more; absurd sizes are refused before memory is asked for
+
+
+def samples(length_x: float, length_y: float, spacing: float) -> tuple[int, int]:
+    """Samples about ``spacing`` [m] apart on a rectangle [m], along x and y; ValueError for none and for too many."""
+    if not min(length_x, length_y, spacing) > 0.0:
+        raise ValueError(
+            f"lengths of more than 0 m, not {length_x:g} m x {length_y:g} m with samples {spacing:g} m apart"
+        )
+    along_x, along_y = length_x / spacing, length_y / spacing
+    if not along_x * along_y <= MAX_SAMPLES:
+        raise ValueError(f"at most {MAX_SAMPLES} samples, not {along_x:.3g} x {along_y:.3g}")
+    return max(2, round(along_x) + 1), max(2, round(along_y) + 1)
 
 
 @dataclass(frozen=True)
@@ -204,8 +217,7 @@ class Heightfield:
         order : int
             Degree of the spline: 1 bilinear, 3 bicubic (can overshoot the original heights by a little).
         """
-        nx = max(2, round(self.size[0] / spacing) + 1)
-        ny = max(2, round(self.size[1] / spacing) + 1)
+        nx, ny = samples(*self.size, spacing)
         spline = RectBivariateSpline(
             np.arange(self.ny), np.arange(self.nx), self.heights, kx=min(order, self.ny - 1), ky=min(order, self.nx - 1)
         )

@@ -141,11 +141,15 @@ def test_a_world_of_an_unknown_type_is_named_with_the_types_there_are(world, mis
     assert re.search(mistake, report.findings[0].text)
 
 
-@pytest.mark.parametrize("size", ["[0.6, -0.8, 0.6]", "[0.0, 0.5, 1.0]"])
-def test_an_obstacle_without_extent_is_a_mistake(size, tmp_path):
+@pytest.mark.parametrize(
+    ("size", "expected"),
+    [("[0.6, -0.8, 0.6]", "> 0 m"), ("[0.0, 0.5, 1.0]", "> 0 m"), ("[0.6, 1.0e+308, 0.6]", "<= 10000 m")],
+)
+def test_an_obstacle_of_no_extent_or_an_absurd_one_is_a_mistake(size, expected, tmp_path):
     obstacles = f"[{{x: 3.0, y: 2.5, size: {size}}}]"
     report = check_scenario(load_yaml(write(tmp_path, [("trial.yaml", "obstacles", obstacles, "")])), load=False)
     assert [key.startswith("obstacles[0].size") for _, key in found(report, tmp_path)] == [True]
+    assert f"expected a number {expected}, got" in report.findings[0].text
 
 
 def test_places_maps_and_plugins_are_checked_in_the_world_together_with_the_rest(tmp_path):
@@ -202,6 +206,19 @@ def test_a_world_that_cannot_be_built_is_a_finding_at_its_key(tmp_path):
 
     assert len(report.findings) == 1
     assert "no.tif" in report.findings[0].text
+
+
+@pytest.mark.parametrize(
+    ("ground", "reason"),
+    [
+        ("size: [1.0e+6, 12.0]", "at most 20000000 samples, not 4e+06 x 48"),
+        ("size: [1.0e+308, 1.0e+308]", "at most 20000000 samples, not inf x inf"),
+        ("size: [40.0, -3.0]", "lengths of more than 0 m, not 40 m x -3 m"),
+    ],
+)
+def test_a_ground_of_too_many_samples_or_none_is_refused_before_it_is_drawn(ground, reason, tmp_path):
+    scenario = write(tmp_path, [("trial.yaml", "world", f"{{type: generated, median_slope: 3.0, {ground}}}", "")])
+    assert [reason in finding.text for finding in check_scenario(load_yaml(scenario)).findings] == [True]
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())
