@@ -5,6 +5,7 @@ at every pose of the path, if the controller does not refuse the plans of one pl
 a robot does not agree that stands, goes about until its time is over, or is led to where the planner knows no path
 any more. Rooms of 6 m x 6 m with boxes and walls with gaps; on the costmap a robot of 1.0 m x 0.5 m, on the mesh a disc
 of 0.25 m. With ``--open`` no walls stand around: the map ends in free ground; that of a mesh always does, on two sides.
+``--map car``: a car of 1.0 m x 0.5 m with a turning circle of 0.7 m in rooms of 9 m x 9 m, and what can drive it.
 
     python benchmarks/agreement.py [--quick] [--json] [--seeds 0:40] [--map costmap] [--planners a,b] [--controllers c]
                                    [--open] [--replan 2] [--results FILE]
@@ -128,7 +129,9 @@ def installed(backend: str, kind: PluginKind) -> list[str]:
 
 
 def pairs(backend: str) -> list[tuple[str, str]]:
-    """All planners with all controllers, but for those controllers that follow one planner only."""
+    """All planners with all controllers, but for those controllers that follow one planner only, and for cars."""
+    if backend == "car":
+        return [("hybrid_astar", controller) for controller in ("mppi", "regulated_pure_pursuit")]
     return [
         (planner, controller)
         for planner in installed(backend, PluginKind.PLANNER)
@@ -177,7 +180,7 @@ def main() -> None:
     seeds = range(5) if chosen.quick else range(*map(int, chosen.seeds.split(":")))
     rows = []
     with tempfile.TemporaryDirectory() as folder, SweepLog(chosen.results or Path(folder) / "drives.jsonl") as log:
-        for backend in [chosen.map] if chosen.map else WORLDS:
+        for backend in [chosen.map] if chosen.map else ("costmap", "mesh"):
             for row in run(backend, seeds, chosen, log):
                 rows.append(row)
                 if not row["agrees"] and not chosen.json:

@@ -28,6 +28,8 @@ from mbf_mesh_nav.plugins import MeshContext
 
 SIDE, RESOLUTION, PERIOD = 6.0, 0.05, 0.05
 OUTLINE = [(0.5, 0.25), (-0.5, 0.25), (-0.5, -0.25), (0.5, -0.25)]
+CAR_OUTLINE = [(0.8, 0.25), (-0.2, 0.25), (-0.2, -0.25), (0.8, -0.25)]
+TURNING_RADIUS, CAR_SIDE = 0.7, 9.0
 RADIUS = 0.25
 PADDED = PlaceQuery(use_padded_footprint=True)
 
@@ -72,24 +74,29 @@ class Box:
         return (x >= self.x0) & (x < self.x1) & (y >= self.y0) & (y < self.y1)
 
 
-WALLS = (
-    Box(0, SIDE, 0, 0.05),
-    Box(0, SIDE, SIDE - 0.05, SIDE),
-    Box(0, 0.05, 0, SIDE),
-    Box(SIDE - 0.05, SIDE, 0, SIDE),
-)
+def walls(side: float) -> list[Box]:
+    """Around a room of ``side`` [m]."""
+    return [
+        Box(0, side, 0, 0.05),
+        Box(0, side, side - 0.05, side),
+        Box(0, 0.05, 0, side),
+        Box(side - 0.05, side, 0, side),
+    ]
 
 
-def random_boxes(rng: np.random.Generator, is_open: bool = False) -> list[Box]:
+WALLS = walls(SIDE)
+
+
+def random_boxes(rng: np.random.Generator, is_open: bool = False, side: float = SIDE) -> list[Box]:
     """Walls around unless it is open, four to eleven boxes, and up to two walls with a gap of 0.7 to 1.5 m."""
-    boxes = [] if is_open else [*WALLS]
+    boxes = [] if is_open else walls(side)
     for _ in range(rng.integers(4, 12)):
-        (x, y), (w, h) = rng.uniform(0.0, SIDE, 2), rng.uniform(0.1, 1.0, 2)
+        (x, y), (w, h) = rng.uniform(0.0, side, 2), rng.uniform(0.1, 1.0, 2)
         boxes.append(Box(x, x + w, y, y + h))
     for _ in range(rng.integers(0, 3)):
-        at, gap = rng.uniform(0.2 * SIDE, 0.8 * SIDE), rng.uniform(0.7, 1.5)
-        begin = rng.uniform(0.0, SIDE - gap)
-        parts = [Box(at, at + 0.1, 0, begin), Box(at, at + 0.1, begin + gap, SIDE)]
+        at, gap = rng.uniform(0.2 * side, 0.8 * side), rng.uniform(0.7, 1.5)
+        begin = rng.uniform(0.0, side - gap)
+        parts = [Box(at, at + 0.1, 0, begin), Box(at, at + 0.1, begin + gap, side)]
         boxes += parts if rng.random() < 0.5 else [Box(p.y0, p.y1, p.x0, p.x1) for p in parts]
     return boxes
 
@@ -99,11 +106,12 @@ class World(ABC):
 
     backend: str
     map: Any
+    side = SIDE
 
     def __init__(self, seed: int, is_open: bool = False) -> None:
         self.clock = Clock()
         rng = np.random.default_rng(seed)
-        self.build(random_boxes(rng, is_open))
+        self.build(random_boxes(rng, is_open, self.side))
         self.ends = self._ends(rng)
 
     @abstractmethod
@@ -134,7 +142,7 @@ class World(ABC):
     def _ends(self, rng: np.random.Generator) -> tuple[Pose, Pose] | None:
         found: list[Pose] = []
         for _ in range(2000):
-            pose = self.pose_on(*rng.uniform(0.3, SIDE - 0.3, 2), rng.uniform(-math.pi, math.pi))
+            pose = self.pose_on(*rng.uniform(0.3, self.side - 0.3, 2), rng.uniform(-math.pi, math.pi))
             if self.fits(pose) and not (found and pose.distance_to(found[0]) < 1.5):
                 found.append(pose)
             if len(found) == 2:
@@ -146,14 +154,16 @@ class CostmapWorld(World):
     """A robot of 1.0 m x 0.5 m on a costmap."""
 
     backend = "costmap"
+    outline = OUTLINE
+    turning_radius = 0.0
 
     def build(self, boxes: list[Box]) -> None:
         """Make the map of a floor with boxes."""
-        centres = (np.arange(round(SIDE / RESOLUTION)) + 0.5) * RESOLUTION
+        centres = (np.arange(round(self.side / RESOLUTION)) + 0.5) * RESOLUTION
         x, y = np.meshgrid(centres, centres)
         cells = np.where(np.any([box.holds(x, y) for box in boxes], axis=0), 254, 0).astype(np.uint8)
         layers = ({"name": "walls", "type": "static"}, {"name": "inflation", "type": "inflation"})
-        parameters = CostmapParameters(resolution=RESOLUTION, footprint=OUTLINE, max_age=0.0, layers=layers)
+        parameters = CostmapParameters(resolution=RESOLUTION, footprint=self.outline, max_age=0.0, layers=layers)
         inflation = {"inflation_radius": 0.8, "cost_scaling_factor": 5.0}
         self.map = build_layered_costmap(parameters, {"inflation": inflation}, static_map=Costmap(cells, RESOLUTION))
         self.map.update(Pose.planar(0.0, 0.0), 0.0)
@@ -162,8 +172,14 @@ class CostmapWorld(World):
         """Make a plugin on the map, with its defaults."""
         plugin_class = PluginRegistry("costmap").load(kind, name)
         maps = {"local": self.map, "global": self.map}
-        common = "dut", plugin_class.Parameters(), self.clock, np.random.default_rng(0), Robot(), self.map
-        return plugin_class(CostmapContext(*common, maps=maps, transforms=TransformBuffer()))
+        parameters = plugin_class.Parameters(**self.parameters(name))
+        common = "dut", parameters, self.clock, np.random.default_rng(0), Robot(), self.map
+        limits = {"transforms": TransformBuffer(), "min_turning_radius": self.turning_radius}
+        return plugin_class(CostmapContext(*common, maps=maps, **limits))
+
+    def parameters(self, name: str) -> dict[str, Any]:
+        """Parameters of a plugin that are not its defaults: none."""
+        return {}
 
     def first_misfit(self, path: Any) -> int:
         """As for all; here with the samples of the controllers."""
@@ -178,6 +194,17 @@ class CostmapWorld(World):
         """Whether the outline touches nothing."""
         centre = self.map.snapshot().cost_at(pose.x, pose.y)
         return centre is not None and centre < 253 and self.map.pose_check(PADDED)(pose).state < CellState.LETHAL
+
+
+class CarWorld(CostmapWorld):
+    """A car of the same size, whose ``base_link`` is on its rear axle, in rooms of 9 m."""
+
+    outline = CAR_OUTLINE
+    turning_radius, side = TURNING_RADIUS, CAR_SIDE
+
+    def parameters(self, name: str) -> dict[str, Any]:
+        """MPPI has to be told how the robot moves."""
+        return {"motion_model": "ackermann"} if name == "mppi" else {}
 
 
 class PaintedLayer(MeshLayer):
@@ -243,4 +270,4 @@ class MeshWorld(World):
         return self.map.pose_check(PADDED)(pose).state < CellState.LETHAL
 
 
-WORLDS = {world.backend: world for world in (CostmapWorld, MeshWorld)}
+WORLDS = {"costmap": CostmapWorld, "mesh": MeshWorld, "car": CarWorld}

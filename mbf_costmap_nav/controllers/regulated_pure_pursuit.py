@@ -3,7 +3,7 @@
 When to use: a good global path that is to be followed as it is, at little computing time (under 0.2 ms a cycle, 0.3 ms
 while it turns at its goal). Forward-only, reversing and turn-in-place robots. When not: obstacles that are not in the
 path - it stops before them (BLOCKED_PATH) and never drives around; that needs replanning, ``costmap.dwa`` or
-``costmap.mppi``. It cuts corners by about look_ahead^2 / (8 * radius).
+``costmap.mppi``. It cuts corners by about look_ahead^2 / (8 * radius); a car cannot correct that on a path as tight as it.
 Formula: pure pursuit (Coulter 1992), curvature = 2 y / L^2; the speeds are those of ``control.regulated_speed``.
 """
 
@@ -18,7 +18,7 @@ from mbf_abstract.geometry import Path, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.continued_path import carried_over
 from mbf_abstract.maps.controllers.end_of_path import at_exact_end, swept_poses, turn_left
-from mbf_abstract.maps.controllers.failures import blocked_path, obstacle_text
+from mbf_abstract.maps.controllers.failures import blocked_path, missed_goal, obstacle_text
 from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
@@ -26,6 +26,7 @@ from mbf_abstract.maps.controllers.room_to_turn import (
     angle_to_path,
     closely_along_path,
     curves_ahead,
+    no_tighter,
     off_course,
     poses_ahead,
     wider_curves,
@@ -63,6 +64,8 @@ class RegulatedPurePursuitController(LeavesContacts, RegulatedFollower):
         cycle = self.begin_cycle(request)
         if isinstance(cycle, ControlResult):
             return cycle
+        if self.turning_radius > 0.0 and (missed := missed_goal(cycle.tracker, request.pose, cycle.goal_tolerance)):
+            return missed
         if (way_out := self._way_out(cycle)) is not None:
             return ControlResult(ExePathOutcome.SUCCESS, "", way_out)
         motions = self._motions(cycle)
@@ -98,21 +101,20 @@ class RegulatedPurePursuitController(LeavesContacts, RegulatedFollower):
         return wider_curves(self._drive(cycle, carrot, backward))
 
     def _closely(self, cycle: ControlCycle, backward: bool) -> list[Twist]:
-        """Motions that creep along the path where a tight place is near ahead; none for a car, or far from the path."""
+        """Motions that creep along the path where a tight place is near ahead; none far from the path."""
         assert self.tracker is not None
         self.tracker.cusp_reached = CUSP_REACHED
-        if not self.rotates:
-            return []
 
         def fits(x: float, y: float, yaw: float) -> bool:
             return not cycle.footprint.collides(cycle.costmap, x, y, yaw)
 
         if self._tight_places.distance(cycle.tracker, self.parameters.allow_reversing, fits) > CLOSE_FROM:
             return []
-        close = closely_along_path(cycle.tracker, cycle.request.pose, backward)
+        motions = closely_along_path(cycle.tracker, cycle.request.pose, backward)
+        close = [no_tighter(motion, self.turning_radius) for motion in motions]
         if close:
             self.tracker.cusp_reached = CLOSELY
-        elif self._tight_places.is_close(cycle.tracker):
+        elif self.rotates and self._tight_places.is_close(cycle.tracker):
             return [self._turn(cycle, angle_to_path(cycle.tracker, cycle.request.pose, backward))]
         return [self._slowed(motion, cycle.request.velocity) for motion in close]
 
@@ -169,9 +171,7 @@ class RegulatedPurePursuitController(LeavesContacts, RegulatedFollower):
         reach = self.goal_dist_tolerance * (2.0 if self._at_goal else 1.0)
         near = math.hypot(goal.x - pose.x, goal.y - pose.y) <= reach
         self._at_goal = near and cycle.tracker.has_arrived(reach)
-        if not self._at_goal:
-            return None
-        return normalize_angle(goal.yaw - pose.yaw)
+        return normalize_angle(goal.yaw - pose.yaw) if self._at_goal else None
 
     def _drive(self, cycle: ControlCycle, carrot: tuple[float, float], backward: bool) -> Twist:
         """Command along the arc through the carrot."""

@@ -23,6 +23,7 @@ SPEC.loader.exec_module(agreement)
 worlds = sys.modules["agreement_worlds"]
 sys.path.remove(str(SOURCE.parent))
 
+PURSUIT = "regulated_pure_pursuit"
 PLANNED = range(8)
 DRIVEN = {"costmap": [8, 16], "mesh": [1]}
 REFUSED = (
@@ -146,6 +147,28 @@ def bend_into_a_gap(world, x, mouth):
     bend = [(x - radius + radius * np.sin(a), y - radius + radius * np.cos(a), -a) for a in turned.tolist()]
     behind = [(x, y - radius - 0.05 * k, -0.5 * np.pi) for k in range(1, 50)]
     return RobotPath.from_poses([world.pose_on(*map(float, pose)) for pose in before + bend + behind])
+
+
+@pytest.mark.parametrize("seed", [4, 7, 11, 22, 39])  # they touched something, or drove round and round at the end
+def test_a_car_arrives_in_a_tight_room(seed):
+    world = agreement.WORLDS["car"](seed)
+    made = world.plugin(PluginKind.PLANNER, "hybrid_astar"), world.plugin(PluginKind.CONTROLLER, PURSUIT)
+    verdict = agreement.drive(world, *made)
+    assert verdict.ending == "arrived", verdict
+
+
+def test_a_car_that_has_passed_its_goal_with_another_heading_asks_for_a_new_plan():
+    world = agreement.WORLDS["car"](4)
+    world.build(worlds.walls(world.side))
+    path = RobotPath.from_poses([world.pose_on(3.0 + 0.1 * k, 4.0, 0.0) for k in range(10)])
+    controller = world.plugin(PluginKind.CONTROLLER, PURSUIT)
+    assert controller.set_plan(path)
+    for x, outcome in ((3.85, ExePathOutcome.SUCCESS), (4.05, ExePathOutcome.MISSED_GOAL)):
+        pose = world.pose_on(x, 4.0, 0.5)
+        assert not controller.is_goal_reached(pose, 0.1, 0.2)
+        result = controller.compute_velocity_commands(ControlRequest(pose, Twist.planar(0.1)))
+        assert result.outcome == outcome, result.message
+    assert result.message == "the robot is 0.15 m past the end of its path, 29 degrees off its heading"
 
 
 @pytest.mark.parametrize(("controller", "width"), THROUGH_GAPS)

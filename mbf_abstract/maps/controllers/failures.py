@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import Pose, normalize_angle
 from mbf_abstract.geometry.tangent_plane import storey_gap
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.queries import PADDED, CellState
@@ -71,6 +71,18 @@ def missed_path(tracker: PathTracker, allowed: float, above: float = 0.0) -> Con
         return None
     message = f"the robot is {deviation:.2f} m from the path, allowed are {allowed:g} m"
     return ControlResult(ExePathOutcome.MISSED_PATH, message)
+
+
+def missed_goal(tracker: PathTracker, pose: Pose, allowed: float) -> ControlResult | None:
+    """Failure of a controller whose robot has passed the end of its path and cannot turn back to it; else None.
+
+    ``allowed`` [m] is how far beside the end it may be.
+    """
+    if tracker.remaining > 0.0 or tracker.length == 0.0 or tracker.deviation <= allowed:
+        return None
+    off = math.degrees(abs(normalize_angle(tracker.goal.yaw - pose.yaw)))
+    message = f"the robot is {tracker.deviation:.2f} m past the end of its path, {off:.0f} degrees off its heading"
+    return ControlResult(ExePathOutcome.MISSED_GOAL, message)
 
 
 def stands(pose: Pose, seconds: float, reason: str = "") -> ControlResult:

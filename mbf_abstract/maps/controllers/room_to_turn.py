@@ -156,6 +156,12 @@ def closely_along_path(tracker: PathTracker, pose: Pose, backward: bool = False)
     return [*motions, *wider_curves(motions[0])[1:]] if motions else []
 
 
+def no_tighter(motion: Twist, radius: float) -> Twist:
+    """The same speed on an arc of at least ``radius`` [m]; 0 = any."""
+    most = abs(motion.vx) / radius if radius > 0.0 else math.inf
+    return Twist.planar(motion.vx, motion.vy, min(max(motion.wz, -most), most))
+
+
 def off_course(bearing: float, backward: bool) -> float:
     """Angle [rad] from the direction of driving to a bearing in the robot's frame."""
     return normalize_angle(bearing + math.pi) if backward else bearing
