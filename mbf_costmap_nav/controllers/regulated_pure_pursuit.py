@@ -3,7 +3,7 @@
 When to use: a good global path that is to be followed as it is, at little computing time (under 0.2 ms a cycle, 0.3 ms
 while it turns at its goal). Forward-only, reversing and turn-in-place robots. When not: obstacles that are not in the
 path - it stops before them (BLOCKED_PATH) and never drives around; that needs replanning, ``costmap.dwa`` or
-``costmap.mppi``. It cuts corners by about look_ahead^2 / (8 * radius); a car cannot correct that on a path as tight as it.
+``costmap.mppi``. It cuts corners by about look_ahead^2 / (8 * radius), which a car cannot always correct.
 Formula: pure pursuit (Coulter 1992), curvature = 2 y / L^2; the speeds are those of ``control.regulated_speed``.
 """
 
