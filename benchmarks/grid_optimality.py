@@ -24,7 +24,6 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from mbf_costmap_nav.kernels.search.grid_line import line_cost, pull_string
-from mbf_costmap_nav.kernels.search.grid_path import trace_cells
 from mbf_costmap_nav.kernels.search.grid_search import FOUND, search
 from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid, pad_cells
 from mbf_costmap_nav.kernels.search.short_lines import trace_lines
@@ -48,10 +47,9 @@ def read_map(path: FilePath) -> np.ndarray:
 def octile_steps(grid: PaddedGrid, start: int, goal: int) -> tuple[float, int]:
     """Straight and diagonal steps of our A* path; inf straight ones without a path."""
     stride = grid.stride
-    status, g = search(grid, start, goal, 1.0, False, False, NO_CANCEL)
+    status, _, path = search(grid, start, goal, 1.0, False, False, NO_CANCEL)
     if status != FOUND:
         return math.inf, 0
-    path = trace_cells(grid, g, goal, False)
     diagonal = int(np.count_nonzero(np.diff(path // stride) * np.diff(path % stride)))
     return len(path) - 1 - diagonal, diagonal
 

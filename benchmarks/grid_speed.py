@@ -130,15 +130,15 @@ class Suite:
         text = f"{self.size:5d}^2 {name:28s} {mine:9.2f} ms, peer {other:9.2f} ms, ratio {ratio:6.3f}"
         print(text + (f"   = {cpp[1] / ratio:.1f} x {cpp[0]} (C++)" if cpp else ""), flush=True)
 
-    def astar(self) -> tuple[int, np.ndarray]:
+    def astar(self) -> tuple[int, np.ndarray, np.ndarray]:
         """Run our A*."""
         return search(self.padded, self.start, self.goal, 1.0, False, False, NO_CANCEL, self.records)
 
-    def field(self) -> tuple[int, np.ndarray]:
+    def field(self) -> tuple[int, np.ndarray, np.ndarray]:
         """Run our full field."""
         return search(self.padded, self.start, -1, 0.0, False, False, NO_CANCEL, self.records)
 
-    def interpolated(self) -> tuple[int, np.ndarray]:
+    def interpolated(self) -> tuple[int, np.ndarray, np.ndarray]:
         """Run navfn's potential up to the goal."""
         return search(self.padded, self.start, self.goal, 0.0, False, True, NO_CANCEL, self.records)
 

@@ -7,6 +7,7 @@ Each becomes a failure that names what is wrong, so that no controller ever foll
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from mbf_abstract.event_values import error_text
@@ -60,11 +61,11 @@ def check_path(answer: PlanResult, request: PlanRequest, runtime: Runtime, area:
         return PlanResult(GetPathOutcome.INTERNAL_ERROR, text)
     goal = request.goal if area is None else path[-1]
     slack = runtime.parameters.plan_end_tolerance
-    for name, index, pose, wanted, tolerance in (
-        ("start", 0, path[0], request.start, 0.0),
-        ("goal", len(path) - 1, path[-1], goal, request.dist_tolerance),
+    for name, index, wanted, tolerance in (
+        ("start", 0, request.start, 0.0),
+        ("goal", len(path) - 1, goal, request.dist_tolerance),
     ):
-        distance = pose.distance_to(wanted)
+        distance = math.dist(path.positions[index].tolist(), wanted.position)
         if distance > tolerance + slack:
             text = f"pose {index} of the path is {distance:.2f} m from the {name}, allowed {tolerance + slack:.2f} m"
             return PlanResult(GetPathOutcome.INTERNAL_ERROR, text)

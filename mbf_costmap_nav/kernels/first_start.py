@@ -18,8 +18,7 @@ from mbf_costmap_nav.kernels.map.path_poses import first_off_grid, level_path
 from mbf_costmap_nav.kernels.map.rasterisation import fill_polygon
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays, mark_points
 from mbf_costmap_nav.kernels.search.exact_ends import cell_centres, with_exact_ends
-from mbf_costmap_nav.kernels.search.grid_path import trace_cells
-from mbf_costmap_nav.kernels.search.grid_search import _write_and_search
+from mbf_costmap_nav.kernels.search.grid_search import _search_and_trace
 from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid
 from mbf_costmap_nav.kernels.search.search_cells import new_records
 
@@ -28,7 +27,7 @@ def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
     """Return each kernel with an example of its arguments, in the order in which a start needs them."""
     cells, row, cost = _example(np.uint8, 2), _example(np.uint8), np.uint8(0)
     reals, points, hits, box = _example(float), _example(float, 2), _example(np.bool_), _example(np.int64)
-    table, records, buckets = _example(np.float32), new_records(2), _example(np.int32, 2)
+    grid, records, buckets = PaddedGrid(row, 0, _example(np.float32)), new_records(2), _example(np.int32, 2)
     costs = cells.copy()
     costs.flags.writeable = False  # a type of its own for numba
     path = points.copy()
@@ -38,12 +37,11 @@ def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
         (_spread_rows, (cells, (0, 0, 0, 0), cells, 0, 0, 0, row, cost)),
         (first_lethal, (costs, 0.0, 0.0, 0.0, points, 0.0, 0.0, 0.0, 0.0)),
         (
-            _write_and_search,
-            (cells, _example(np.uint64, 2), records, table, 0, 0, 0.0, True, True, row, buckets, box),
+            _search_and_trace,
+            (grid, cells, _example(np.uint64, 2), records, records["g"], 0, 0, 0.0, True, True, row, buckets, box),
         ),
-        (trace_cells, (PaddedGrid(row, 0, table), records["g"], 0, True)),
         (cell_centres, (_example(np.int32), 0, reals)),
-        (with_exact_ends, (costs, 0, 0, reals, points, reals, reals, 0.0)),
+        (with_exact_ends, (costs, 0, 0, reals, points, 0.0, 0.0, 0.0, 0.0, 0.0)),
         (fits_along, (costs, 0.0, 0.0, 0.0, points, points, 0.0, 0.0, 0.0, 0.0)),
         (level_path, (points, 0.0, 0.0)),
         (first_off_grid, (path, 0, 0, 0.0, 0.0, 0.0)),

@@ -21,7 +21,7 @@ from typing import ClassVar
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_costmap_nav.kernels.search.grid_path import trace_cells
-from mbf_costmap_nav.kernels.search.grid_search import CANCELED, new_search_memory, search
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND, new_search_memory, search
 from mbf_costmap_nav.planning.grid_planning import NO_LEG, GridPlanner, Leg
 from mbf_costmap_nav.planning.potential_planning import plan_down_potential
 from mbf_costmap_nav.planning.search_grid import GridPlannerParameters, SearchGrid
@@ -47,12 +47,13 @@ class AStarPlanner(GridPlanner):
         cut, goal_cell = self.parameters.cut_corners, grid.cell_of(goal)
         first, last, flag = grid.index(grid.cell_of(start)), grid.index(goal_cell), grid.token.flag
         (records, buckets), touched = grid.memory(new_search_memory)
-        status, g = search(grid.padded, first, last, 1.0, cut, False, flag, records, touched, buckets)
+        status, g, path = search(grid.padded, first, last, 1.0, cut, False, flag, records, touched, buckets)
         if status == CANCELED:
             return NO_LEG
-        end = goal_cell if g[last] < float("inf") else grid.nearest_reached(g, goal, tolerance)
-        if end is None:
-            return NO_LEG
-        trace = trace_cells(grid.padded, g, grid.index(end), cut)
-        cost = float(g[grid.index(end)]) * grid.costmap.resolution
-        return Leg(grid.points(trace)[::-1], cost, end == goal_cell)
+        if status != FOUND:
+            end = grid.nearest_reached(g, goal, tolerance)
+            if end is None:
+                return NO_LEG
+            path = trace_cells(grid.padded, g, grid.index(end), cut)[::-1]
+        cost = float(g[path[-1]]) * grid.costmap.resolution
+        return Leg(grid.points(path), cost, status == FOUND)

@@ -136,7 +136,7 @@ class CarWorld:
         """
         grid, first, last = self.grid, self._cell(start), self._cell(goal)
         (records, buckets), touched = grid.memory(new_search_memory)
-        status, g = search(grid.padded, first, last, 1.0, True, False, grid.token.flag, records, touched, buckets)
+        status, g, _ = search(grid.padded, first, last, 1.0, True, False, grid.token.flag, records, touched, buckets)
         return status == FOUND, g
 
     def field(self, source: Pose) -> NDArray[np.float32]:

@@ -117,9 +117,9 @@ class GridPlanner(CostmapPlanner):
                 return answer
             fitted = answer
         # 4. One path of all legs.
-        path = assembled(fitted, request, goal, grid.costmap.frame_id, self.clock.now())
-        message = f"{len(path)} poses, {path.length:.2f} m"
-        off = math.dist(path.positions[-1][:2], (request.goal.x, request.goal.y))
+        path, length = assembled(fitted, request, goal, grid.costmap.frame_id, self.clock.now())
+        message = f"{len(path)} poses, {length:.2f} m"
+        off = math.dist(path.positions[-1, :2].tolist(), (request.goal.x, request.goal.y))
         if not reached_goal or off > 1e-9:
             message += f", {ends_beside(off, request.dist_tolerance)}"
         return PlanResult(GetPathOutcome.SUCCESS, message, path, cost)
@@ -211,7 +211,9 @@ def check_tolerance(tolerance: float) -> None:
 
 def off_map(costmap: Costmap, pose: Pose, name: str, tolerance: float = 0.0) -> PlanResult | None:
     """Failure for a pose off the map, unless a cell's centre is within ``tolerance`` [m] of it."""
+    if costmap.contains(pose.x, pose.y):
+        return None
     centre = costmap.cell_to_world(*costmap.world_to_cell_clamped(pose.x, pose.y))
-    if costmap.contains(pose.x, pose.y) or math.dist(centre, (pose.x, pose.y)) <= tolerance:
+    if math.dist(centre, (pose.x, pose.y)) <= tolerance:
         return None
     return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{name} ({pose.x:.2f}, {pose.y:.2f}) is outside {costmap}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Path, Pose, quaternion_from_yaw
@@ -18,12 +20,17 @@ def heights_along(points: FloatArray, request: PlanRequest) -> FloatArray:
     return np.asarray(request.start.z + share * (request.goal.z - request.start.z))
 
 
-def assembled(pieces: list[Fitted], request: PlanRequest, goal: Pose, frame_id: str, stamp: float) -> Path:
-    """Join the legs; poses head along the path or as the manoeuvres do, the first and the last one as requested."""
+def assembled(
+    pieces: list[Fitted], request: PlanRequest, goal: Pose, frame_id: str, stamp: float
+) -> tuple[Path, float]:
+    """Join the legs; poses head along the path or as the manoeuvres do, the first and the last one as requested.
+
+    Returns the path and its length [m].
+    """
     joined = pieces[0].points
     if len(pieces) > 1:
         joined = np.concatenate([joined, *(piece.points[1:] for piece in pieces[1:])])
-    positions, orientations = level_path(np.ascontiguousarray(joined), request.start.z, request.goal.z)
+    positions, orientations, length = level_path(np.ascontiguousarray(joined), request.start.z, request.goal.z)
     first = 0
     for piece in pieces:
         if piece.yaws is not None:
@@ -32,4 +39,6 @@ def assembled(pieces: list[Fitted], request: PlanRequest, goal: Pose, frame_id: 
                     orientations[first + index] = quaternion_from_yaw(piece.yaws[index])
         first += len(piece.points) - 1
     orientations[-1], orientations[0] = goal.orientation, request.start.orientation
-    return Path(positions, orientations, frame_id, stamp)
+    if not math.isfinite(length):  # heights at the end of what a float can be
+        return Path(positions, orientations, frame_id, stamp), length
+    return Path.of_checked_arrays(positions, orientations, frame_id, stamp), length

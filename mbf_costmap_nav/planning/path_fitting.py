@@ -101,12 +101,12 @@ class PathFitting:
         yaw = start.yaw
         for number, piece in enumerate(pieces):
             is_last = number == len(pieces) - 1
-            spare = tolerance - math.dist(piece[-1], (goal.x, goal.y)) if is_last else 0.0
+            spare = tolerance - math.dist(piece[-1].tolist(), (goal.x, goal.y)) if is_last else 0.0
             leg = self._manoeuvres.fit(piece, yaw, goal.yaw if is_last else None, spare)
             if isinstance(leg, Misfit):
                 return self._failure(leg, start)
             fitted.append(leg)
-            yaw = leg.end_yaw
+            yaw = yaw if is_last else leg.end_yaw
         return fitted
 
     def _failure(self, misfit: Misfit, start: Pose) -> PlanResult:

@@ -58,5 +58,5 @@ def _propagate(grid: SearchGrid, source: Cell, until: int, interpolated: bool) -
     """Field from ``source`` up to the padded index ``until``, or everywhere for -1; None when cancelled."""
     first, flag = grid.index(source), grid.token.flag
     (records, buckets), touched = grid.memory(new_search_memory)
-    status, g = search(grid.padded, first, until, 0.0, False, interpolated, flag, records, touched, buckets)
+    status, g, _ = search(grid.padded, first, until, 0.0, False, interpolated, flag, records, touched, buckets)
     return None if status == CANCELED else g

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -30,7 +30,6 @@ Memory = TypeVar("Memory")
 TABLES_KEPT = 32
 NEAR_END = 0.75
 """Points this near [cells] to an exact start or goal are dropped: going there first would be a step back."""
-NO_GOAL = np.full(2, np.nan)
 NO_ROBOT = np.zeros((0, 2))
 """Footprint samples of a robot that fits everywhere."""
 
@@ -93,6 +92,8 @@ class SearchGrid:
     ----------
     padded : PaddedGrid
         Its costs and their traversal, 1 for free, inf for blocked.
+    first_blocked : int
+        Least cost that blocks.
     token : CancelToken
         Ends long searches early; their results are then invalid.
     workspace : SearchWorkspace
@@ -101,6 +102,7 @@ class SearchGrid:
 
     costmap: Costmap
     padded: PaddedGrid
+    first_blocked: int
     token: CancelToken
     workspace: SearchWorkspace
 
@@ -116,7 +118,7 @@ class SearchGrid:
         table = traversal_table(parameters.cost_factor, parameters.lethal_cost, parameters.allow_unknown)
         workspace = workspace or SearchWorkspace()
         padded = PaddedGrid(workspace.padded_cells(costmap, token), costmap.width + 2, table)
-        return cls(costmap, padded, token, workspace)
+        return cls(costmap, padded, parameters.lethal_cost, token, workspace)
 
     def memory(self, make: Callable[[int], Memory]) -> tuple[Memory, Box]:
         """Memory for a search on this grid, see ``SearchWorkspace``; it holds what the last one left there."""
@@ -152,25 +154,20 @@ class SearchGrid:
             for point in (a, b)
             for value, origin in zip(np.asarray(point).tolist(), (grid.origin_x, grid.origin_y), strict=True)
         ]
-        return int(cost_along(grid.cells, self._unknown_on_lines, *ends)) < self._first_blocked
+        return int(cost_along(grid.cells, self._unknown_on_lines, *ends)) < self.first_blocked
 
     def with_exact_ends(self, points: NDArray[np.float64], start: Pose, goal: Pose | None) -> NDArray[np.float64]:
         """Replace the cell centres (n, 2) [m] at the ends by the exact start, and by the exact goal if it is given."""
-        ends = np.array([start.x, start.y]), NO_GOAL if goal is None else np.array([goal.x, goal.y])
-        lines = self.costmap.cells, self._unknown_on_lines, self._first_blocked, self.geometry
-        given = np.ascontiguousarray(points, dtype=np.float64)
-        exact: NDArray[np.float64] = with_exact_ends(*lines, given, *ends, NEAR_END * self.costmap.resolution)
+        goal_x, goal_y = (math.nan, math.nan) if goal is None else (goal.x, goal.y)
+        lines = self.costmap.cells, self._unknown_on_lines, self.first_blocked, self.geometry
+        given, near = np.ascontiguousarray(points, dtype=np.float64), NEAR_END * self.costmap.resolution
+        exact: NDArray[np.float64] = with_exact_ends(*lines, given, start.x, start.y, goal_x, goal_y, near)
         return exact
 
     @property
     def _unknown_on_lines(self) -> int:
         """What an unknown cell counts as on a line."""
         return LETHAL if math.isinf(self.padded.table[UNKNOWN]) else 0
-
-    @cached_property
-    def _first_blocked(self) -> int:
-        """Least cost that blocks."""
-        return int(np.argmax(np.isinf(self.padded.table[:UNKNOWN])))
 
     def nearest_reached(
         self, g: NDArray[np.float32], goal: Pose, tolerance: float, samples: NDArray[np.float64] = NO_ROBOT

@@ -154,18 +154,18 @@ def test_the_tolerances_are_the_servers_unless_given():
     assert seen == [(usual.dist_tolerance, usual.angle_tolerance), (0.1, 0.2)]
 
 
-def test_pairs_that_lie_far_apart_are_planned_first_and_results_are_in_the_order_of_the_pairs():
+def test_far_pairs_are_planned_first_and_a_near_one_after_every_two_but_results_are_in_the_order_of_the_pairs():
     asked = []
 
     def noted(request):
         asked.append(request.goal.x)
         return straight_plan(request)
 
-    goals = [Pose.planar(x, 0.0) for x in (2.0, 4.0, 1.0, 3.0)]
+    given = [2.0, 4.0, 7.0, 1.0, 6.0, 3.0, 5.0]
     with ScriptedSession({"planner": played(noted)}) as session:
-        results = BatchPlanner(session.server, workers=1).plan_many([HERE] * 4, goals)
-    assert asked == [4.0, 3.0, 2.0, 1.0]
-    assert [result.path[-1].x for result in results] == [2.0, 4.0, 1.0, 3.0]
+        results = BatchPlanner(session.server, workers=1).plan_many([HERE] * 7, [Pose.planar(x, 0.0) for x in given])
+    assert asked == [7.0, 6.0, 2.0, 5.0, 4.0, 1.0, 3.0]
+    assert [result.path[-1].x for result in results] == given
 
 
 def test_what_is_left_after_a_cancel_is_canceled():

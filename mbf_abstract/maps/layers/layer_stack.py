@@ -52,7 +52,7 @@ class LayerStack(Mapping[str, Layer_co], Generic[Layer_co]):
     @property
     def enabled(self) -> Iterator[Layer_co]:
         """The layers that take part."""
-        return (layer for layer in self.values() if layer.parameters.enabled)
+        return (layer for layer in self._layers.values() if layer.parameters.enabled)
 
     def chosen(self, names: Iterable[str] | None) -> list[Layer_co]:
         """All layers, or those of some names; KeyError names the known ones."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.compiling.decorators import inner_kernel, kernel, plain_kernel
+from mbf_abstract.compiling.decorators import brief_kernel, inner_kernel, kernel, plain_kernel
 
 SPARE_REACH = 0.5
 """How much larger the square is that is looked at once for many poses, in reaches of the footprint."""
@@ -67,7 +67,7 @@ def footprint_cost(
     return OUTSIDE if outside else worst
 
 
-@plain_kernel
+@brief_kernel
 def first_lethal(
     cells: NDArray[np.uint8],
     resolution: float,

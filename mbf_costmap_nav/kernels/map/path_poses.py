@@ -50,10 +50,11 @@ def headed_poses(points: FloatArray) -> FloatArray:
 
 
 @brief_kernel
-def level_path(points: FloatArray, start_height: float, goal_height: float) -> tuple[FloatArray, FloatArray]:
-    """Positions (n, 3) [m] over points (n, 2), rising evenly from one height to another, and level headings (n, 4).
+def level_path(points: FloatArray, start_height: float, goal_height: float) -> tuple[FloatArray, FloatArray, float]:
+    """Positions (n, 3) [m] over finite points (n, 2), rising evenly from one height to another; headings; the length.
 
-    Each pose looks to the next point, one that is repeated where the next one looks, the last one as the one before.
+    The headings (n, 4) are level unit quaternions. Each pose looks to the next point, one that is repeated where the
+    next one looks, the last one as the one before. Where the length [m] is finite, so are all numbers.
     """
     lengths, count = _lengths(points), len(points)
     positions, quaternions = np.empty((count, 3)), np.zeros((count, 4))
@@ -61,6 +62,10 @@ def level_path(points: FloatArray, start_height: float, goal_height: float) -> t
         share = lengths[i] / lengths[count - 1] if lengths[count - 1] > 0.0 else lengths[i]
         positions[i, 0], positions[i, 1] = points[i, 0], points[i, 1]
         positions[i, 2] = start_height + share * (goal_height - start_height)
+    length = 0.0
+    for i in range(count - 1):
+        dx, dy, dz, _ = _step(positions, i)
+        length += math.sqrt(dx * dx + dy * dy + dz * dz)
     x, y, z, known = 1.0, 0.0, 0.0, False
     for i in range(count - 2, -1, -1):  # the last point that moves on
         if not known and _moves(positions, i):
@@ -69,7 +74,7 @@ def level_path(points: FloatArray, start_height: float, goal_height: float) -> t
         if i + 1 < count and _moves(positions, i):
             x, y, z, known = _step(positions, i)
         _set_level(quaternions, i, x, y, z)
-    return positions, quaternions
+    return positions, quaternions, length
 
 
 @kernel
@@ -81,7 +86,7 @@ def yaw_quaternions(yaws: FloatArray) -> FloatArray:
     return quaternions
 
 
-@plain_kernel
+@brief_kernel
 def first_off_grid(
     points: FloatArray, width: int, height: int, resolution: float, origin_x: float, origin_y: float
 ) -> int:

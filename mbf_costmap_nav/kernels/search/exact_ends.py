@@ -20,8 +20,10 @@ def with_exact_ends(
     first_blocked: int,
     geometry: FloatArray,
     points: FloatArray,
-    start: FloatArray,
-    goal: FloatArray,
+    start_x: float,
+    start_y: float,
+    goal_x: float,
+    goal_y: float,
     distance: float,
 ) -> FloatArray:
     """Replace the ends of a path of cell centres by the exact start and the exact goal.
@@ -37,7 +39,7 @@ def with_exact_ends(
         [m].
     points : (n, 2) float64
         [m]; at least one.
-    start, goal : (2,) float64
+    start_x, start_y, goal_x, goal_y : float
         [m]; a goal of nan leaves the end as it is.
     distance : float
         Points this near [m] to the exact start or goal are dropped: going there first would be a step back.
@@ -47,10 +49,11 @@ def with_exact_ends(
     points : (m, 2) float64
         Where the line from an exact end to the rest is blocked, all points are kept: a line within one cell is free.
     """
-    points = _exactly_from(cells, unknown, first_blocked, geometry, points, start, distance)
-    if math.isnan(goal[0]):
+    points = _exactly_from(cells, unknown, first_blocked, geometry, points, start_x, start_y, distance)
+    if math.isnan(goal_x):
         return points
-    return _reversed(_exactly_from(cells, unknown, first_blocked, geometry, _reversed(points), goal, distance))
+    turned = _reversed(points)
+    return _reversed(_exactly_from(cells, unknown, first_blocked, geometry, turned, goal_x, goal_y, distance))
 
 
 @kernel
@@ -60,21 +63,22 @@ def _exactly_from(
     first_blocked: int,
     geometry: FloatArray,
     points: FloatArray,
-    exact: FloatArray,
+    x: float,
+    y: float,
     distance: float,
 ) -> FloatArray:
     """Begin with a point of the first point's cell instead of that point, and of what lies as near."""
     kept, count = Count(0), len(points)
     if count > 1:
         kept = Count(1)
-        while kept < count - 1 and math.hypot(points[kept, 0] - exact[0], points[kept, 1] - exact[1]) <= distance:
+        while kept < count - 1 and math.hypot(points[kept, 0] - x, points[kept, 1] - y) <= distance:
             kept += 1
-        x0, y0 = (exact[0] - geometry[1]) / geometry[0], (exact[1] - geometry[2]) / geometry[0]
+        x0, y0 = (x - geometry[1]) / geometry[0], (y - geometry[2]) / geometry[0]
         x1, y1 = (points[kept, 0] - geometry[1]) / geometry[0], (points[kept, 1] - geometry[2]) / geometry[0]
         if cost_along(cells, unknown, x0, y0, x1, y1) >= first_blocked:
             kept = Count(0)
     begun = np.empty((count - kept + 1, 2))
-    begun[0, 0], begun[0, 1] = exact[0], exact[1]
+    begun[0, 0], begun[0, 1] = x, y
     for i in range(kept, count):
         begun[i - kept + 1, 0], begun[i - kept + 1, 1] = points[i, 0], points[i, 1]
     return begun

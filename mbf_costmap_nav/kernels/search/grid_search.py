@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import kernel
+from mbf_costmap_nav.kernels.search.grid_path import trace_cells
 from mbf_costmap_nav.kernels.search.open_list import RING, bucket_width, enlarged_if_full
 from mbf_costmap_nav.kernels.search.padded_grid import INF, PaddedGrid, octile_distance
 from mbf_costmap_nav.kernels.search.relaxing import relax_bucket, relax_interpolated
@@ -46,7 +47,7 @@ def search(
     records: Records | None = None,
     touched: Box | None = None,
     buckets: NDArray[np.int32] | None = None,
-) -> tuple[int, NDArray[np.float32]]:
+) -> tuple[int, NDArray[np.float32], NDArray[np.int32]]:
     """Settle cells around ``start`` until ``goal`` is settled, or everything reachable if it cannot be reached.
 
     Parameters
@@ -78,16 +79,18 @@ def search(
     g : (n,) float32
         Cost from the start in traversal times cells, inf where not reached. Exact for settled cells, an upper bound
         at the boundary of the search. A view into the search's records, so not contiguous.
+    path : (m,) int32
+        Flat padded indices from the start to a goal that was found by steps, see ``trace_cells``; else none.
     """
     records = new_records(grid.cells.size) if records is None else records
-    whole = whole_grid(grid.cells, grid.stride)
-    touched = whole.copy() if touched is None else touched
+    touched = whole_grid(grid.cells, grid.stride) if touched is None else touched
     buckets = new_buckets(grid.cells.size) if buckets is None else buckets
-    status = _write_and_search(
+    status, path = _search_and_trace(
+        grid,
         grid.cells.reshape(-1, grid.stride),
         records.view(np.uint64).reshape(-1, grid.stride),
         records,
-        grid.table,
+        records["g"],
         start,
         goal,
         heuristic_scale,
@@ -98,8 +101,8 @@ def search(
         touched,
     )
     if heuristic_scale == 0.0 or cancel_flag[0] != 0:  # set while the records were written, it left some of them out
-        touched[:] = whole
-    return status, records["g"]
+        touched[:] = whole_grid(grid.cells, grid.stride)
+    return status, records["g"], path
 
 
 def new_buckets(count: int) -> NDArray[np.int32]:
@@ -113,11 +116,12 @@ def new_search_memory(count: int) -> tuple[Records, NDArray[np.int32]]:
 
 
 @kernel
-def _write_and_search(
+def _search_and_trace(
+    grid: PaddedGrid,
     cells: NDArray[np.uint8],
     words: NDArray[np.uint64],
     records: Records,
-    table: NDArray[np.float32],
+    g: NDArray[np.float32],
     start: int,
     goal: int,
     heuristic_scale: float,
@@ -126,13 +130,20 @@ def _write_and_search(
     cancel_flag: NDArray[np.uint8],
     buckets: NDArray[np.int32],
     touched: Box,
-) -> int:
-    """Write the records of the touched box, which ``words`` are, too, and search; all in one, see ``_search``."""
+) -> tuple[int, NDArray[np.int32]]:
+    """Write the records of the touched box, which ``words`` are, too, search, and trace the path to the goal.
+
+    ``cells`` are those of the grid by rows, ``g`` is that of the records. All in one, so that the interpreter's lock is
+    given away once.
+    """
     write_box(cells, words, cancel_flag, touched)
-    stride = cells.shape[1]
-    return _search(
+    _, stride, table = grid
+    status = _search(
         records, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, buckets, touched
     )
+    if status != FOUND or interpolated:
+        return status, np.empty(0, dtype=np.int32)
+    return status, trace_cells(grid, g, goal, cut_corners)[::-1].copy()
 
 
 @kernel

@@ -112,6 +112,14 @@ def test_a_slice_of_a_path_is_a_path_in_the_same_frame():
     assert path[1].stamp == 3.0
 
 
+def test_a_path_of_checked_arrays_is_the_same_path_and_read_only():
+    positions, orientations = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 2.0]]), np.array([[0.0, 0.0, 0.0, 1.0]] * 2)
+    expected = Path(positions, orientations, "odom", 3.0)
+    path = Path.of_checked_arrays(positions, orientations, "odom", 3.0)
+    assert list(path) == list(expected) and path.length == expected.length and path.guidance is None
+    assert not (path.positions.flags.writeable or path.orientations.flags.writeable)
+
+
 def test_the_arrays_of_a_path_are_its_own_and_read_only():
     positions = np.zeros((2, 3))
     path = Path(positions)

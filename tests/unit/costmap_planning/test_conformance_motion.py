@@ -150,7 +150,7 @@ def distances(lethal, start):
     origin = (start[1] + 1) * 12 + start[0] + 1
     table = traversal_table(0.0, 254, True)
     grid = PaddedGrid(pad_cells(cells, 254), 12, table)
-    _, g = search(grid, origin, -1, 0.0, False, False, np.zeros(1, dtype=np.uint8))
+    _, g, _ = search(grid, origin, -1, 0.0, False, False, np.zeros(1, dtype=np.uint8))
     return np.asarray(g).reshape(12, 12)[1:-1, 1:-1]
 
 

@@ -69,9 +69,9 @@ def run(cells, start, goal, *, cost_factor=3.0, allow_unknown=False, cut_corners
         return (cell[0] + 1) * stride + cell[1] + 1
 
     if goal is None:
-        status, g = search(grid, index(start), -1, 0.0, cut_corners, False, flag)
+        status, g, _ = search(grid, index(start), -1, 0.0, cut_corners, False, flag)
     else:
-        status, g = search(grid, index(start), index(goal), 1.0, cut_corners, False, flag)
+        status, g, _ = search(grid, index(start), index(goal), 1.0, cut_corners, False, flag)
     return status, g.reshape(-1, stride)[1:-1, 1:-1], (grid, g), index
 
 
@@ -109,7 +109,7 @@ def test_memory_that_has_been_searched_in_changes_no_later_search(first, second)
         stride = cells.shape[1] + 2
         grid = PaddedGrid(pad_cells(cells, 254), stride, table)
         records = memory[: grid.cells.size]
-        status, g = search(grid, stride + 1, -1, 0.0, False, False, NO_CANCEL, records)
+        status, g, _ = search(grid, stride + 1, -1, 0.0, False, False, NO_CANCEL, records)
         alone = search(grid, stride + 1, -1, 0.0, False, False, NO_CANCEL)
         assert status == alone[0]
         np.testing.assert_array_equal(g, alone[1])
@@ -143,7 +143,7 @@ def test_memory_that_is_cleaned_where_it_was_touched_changes_no_later_search(cel
 def test_a_field_may_end_at_a_cell_that_has_its_final_value():
     cells = np.zeros((80, 80), dtype=np.uint8)
     _, _, (padded, whole), index = run(cells, (5, 5), None)
-    status, g = search(padded, index((5, 5)), index((9, 12)), 0.0, False, False, NO_CANCEL)
+    status, g, _ = search(padded, index((5, 5)), index((9, 12)), 0.0, False, False, NO_CANCEL)
     assert status == FOUND and g[index((9, 12))] == whole[index((9, 12))]
     assert np.isinf(g[index((79, 79))])
 
@@ -154,9 +154,12 @@ def test_a_star_reaches_the_goal_at_the_cost_of_the_field(cells, cut_corners, da
     goal = (data.draw(st.integers(0, cells.shape[0] - 1)), data.draw(st.integers(0, cells.shape[1] - 1)))
     cells[0, 0] = 0
     _, field, _, _ = run(cells, (0, 0), None, cut_corners=cut_corners)
-    status, g, _, _ = run(cells, (0, 0), goal, cut_corners=cut_corners)
+    status, g, grid, index = run(cells, (0, 0), goal, cut_corners=cut_corners)
     assert g[goal] == pytest.approx(field[goal], rel=1e-5)
     assert status == (FOUND if np.isfinite(field[goal]) else EXHAUSTED)
+    path = search(grid[0], index((0, 0)), index(goal), 1.0, cut_corners, False, NO_CANCEL)[2]
+    traced = trace_cells(*grid, index(goal), cut_corners)[::-1] if status == FOUND else []
+    np.testing.assert_array_equal(path, traced)
 
 
 @settings(max_examples=60, deadline=None)
@@ -321,19 +324,19 @@ def test_the_interpolated_potential_equals_navfns_update_repeated_until_nothing_
     cells[0, 0] = 0
     table, stride = traversal_table(cost_factor, 253, False), cells.shape[1] + 2
     grid, start = PaddedGrid(pad_cells(cells, 254), stride, table), stride + 1
-    _, g = search(grid, start, -1, 0.0, False, True, NO_CANCEL)
+    _, g, _ = search(grid, start, -1, 0.0, False, True, NO_CANCEL)
     expected = naive_potential(cells, table, (0, 0))
     np.testing.assert_allclose(g.reshape(-1, stride)[1:-1, 1:-1], expected, rtol=1e-5)
     y, x = np.argwhere(np.isfinite(expected))[-1]
     goal = (y + 1) * stride + x + 1
-    status, partial = search(grid, start, goal, 0.0, False, True, NO_CANCEL)
+    status, partial, _ = search(grid, start, goal, 0.0, False, True, NO_CANCEL)
     assert status == FOUND and partial[goal] == pytest.approx(expected[y, x], rel=1e-5)
 
 
 def test_the_interpolated_potential_in_the_open_is_nearly_the_euclidean_distance():
     table, stride = traversal_table(3.0, 253, False), 102
     grid = PaddedGrid(pad_cells(np.zeros((100, 100), dtype=np.uint8), 254), stride, table)
-    _, g = search(grid, 11 * stride + 11, -1, 0.0, False, True, NO_CANCEL)
+    _, g, _ = search(grid, 11 * stride + 11, -1, 0.0, False, True, NO_CANCEL)
     g = g.reshape(102, 102)[1:-1, 1:-1]
     y, x = np.mgrid[:100, :100] - 10
     far = np.hypot(x, y) > 20

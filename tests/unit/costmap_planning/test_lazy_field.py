@@ -51,7 +51,7 @@ def test_costs_are_those_of_the_whole_field_whatever_was_asked_before(cost_facto
     for _ in range(40):
         grid = random_grid(rng, cost_factor, blocked=rng.uniform(0.1, 0.65))
         source, toward, *asked = free_cells(grid, rng, 30)
-        _, whole = search(grid, source, -1, 0.0, True, False, NOT_CANCELED)
+        _, whole, _ = search(grid, source, -1, 0.0, True, False, NOT_CANCELED)
         costs, _ = costs_of(memory_for(grid, capacity), source, toward, np.array(asked), NOT_CANCELED)
         np.testing.assert_allclose(costs, whole[asked], rtol=1e-5)
         unreached += np.isinf(costs).sum()

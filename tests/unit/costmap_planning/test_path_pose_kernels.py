@@ -74,9 +74,18 @@ def test_a_level_path_has_the_bytes_of_numpy(heights):
         share = along / along[-1] if along[-1] > 0.0 else along
         z = heights[0] + share * (heights[1] - heights[0])
         expected = Path.from_points(np.column_stack([points, z]))
-        positions, orientations = level_path(points, *heights)
+        positions, orientations, length = level_path(points, *heights)
         same_bytes(positions, expected.positions)
         same_bytes(orientations, expected.orientations)
+        assert length == pytest.approx(expected.length, rel=1e-12)
+
+
+def test_a_level_path_of_finite_length_has_finite_numbers_only():
+    points, highest = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]]), np.finfo(np.float64).max
+    for heights in ((highest, -highest), (0.0, highest), (-1e200, 1e200), (1e100, 1e100), (0.0, 1e150)):
+        positions, orientations, length = level_path(points, *heights)
+        finite = bool(np.isfinite(positions).all() and np.isfinite(orientations).all())
+        assert finite or not np.isfinite(length)
 
 
 def test_quaternions_of_yaws_have_the_bytes_of_the_geometry():
