@@ -92,17 +92,20 @@ NOT_SMOOTHED = KeptNoise(1.0, 0.5)
 """The weights of the corners are 1/6 each when squared and averaged over a face, together 1/2."""
 
 
-def noise_of_points(patches: SurfacePatches, points: FloatArray, within: float, rise: float) -> float:
+def noise_of_points(
+    patches: SurfacePatches, points: FloatArray, counted: BoolArray, within: float, rise: float
+) -> float:
     """Standard error of the points [m] about the faces between the patches; 0 where there are no faces.
 
     Parameters
     ----------
+    counted : (P,) bool
+        Patches whose points count, with the faces between these.
     within : float
         Points farther from the faces [m] do not count.
     """
-    everywhere = np.ones(len(patches.cells), dtype=np.bool_)
     arrays = (points, patches.firsts, patches.ends, patches.centres, patches.heights, patches.links(rise))
-    distances = distances_to_faces(*arrays, everywhere, patches.grid.cell, within)
+    distances = distances_to_faces(*arrays, counted, patches.grid.cell, within)
     return float(np.nanmedian(np.abs(distances))) / MEDIAN_OF_ERRORS if np.isfinite(distances).any() else 0.0
 
 
@@ -110,9 +113,10 @@ def settled(patches: SurfacePatches, points: FloatArray, limits: HeightLimits) -
     """Copy with heights along the slopes of the surface, and the points that stand on it counted."""
     bands = np.array([limits.thickness, limits.step, limits.clearance])
     for _ in range(SETTLINGS):
-        slopes = slopes_of_patches(patches.heights, patches.links(limits.rise), patches.grid.cell)
+        links = patches.links(limits.rise)
+        slopes = slopes_of_patches(patches.heights, links, patches.grid.cell)
         arrays = (patches.firsts, patches.ends, patches.kinds, patches.centres, patches.heights)
-        heights, standing = settle_patches(points, *arrays, slopes, bands)
+        heights, standing = settle_patches(points, *arrays, slopes, links, bands)
         patches = replace(patches, heights=heights, standing=standing)
     return patches
 
@@ -162,9 +166,10 @@ def _kept_noise(stiffness: float) -> KeptNoise:
 
 def fitted(patches: SurfacePatches, points: FloatArray, limits: HeightLimits, is_smoothed: bool) -> SurfacePatches:
     """Copy whose faces are as near to the ground points as these are exact; see ``fitted_heights``."""
+    everywhere = np.ones(len(patches.cells), dtype=np.bool_)
     improbable = IMPROBABLE_AFTER_SMOOTHING if is_smoothed else IMPROBABLE
     for _ in range(FITTINGS):
-        error = noise_of_points(patches, points, limits.thickness, limits.rise)
+        error = noise_of_points(patches, points, everywhere, limits.thickness, limits.rise)
         arrays = (points, patches.firsts, patches.ends, patches.centres, patches.heights, patches.links(limits.rise))
         heights = fitted_heights(*arrays, patches.grid.cell, np.array([limits.thickness, improbable * error]))
         patches = replace(patches, heights=heights)

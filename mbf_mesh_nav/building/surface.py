@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from mbf_mesh_nav.building.height_errors import height_errors
 from mbf_mesh_nav.building.heights import HeightLimits, fitted, noise_of_points, settled, smoothed, without_false_ground
 from mbf_mesh_nav.building.holes import without_holes
 from mbf_mesh_nav.building.outliers import isolated_points
+from mbf_mesh_nav.building.slabs import over_unseen_ground, without_undersides
 from mbf_mesh_nav.building.surface_patches import Grid, SurfacePatches
 from mbf_mesh_nav.kernels.building.columns import first_heights, sort_into_cells, split_columns
 from mbf_mesh_nav.kernels.building.quads import distances_to_faces, faces_of_patches
@@ -138,7 +139,8 @@ def build_surface(
     rise = cell * float(tan(np.radians(chosen.max_slope))) + chosen.ground_thickness
     patches, kept = _split(kept, grid, chosen, rise)
     limits = HeightLimits(0.0, chosen.ground_thickness, chosen.step_height, chosen.clearance, rise)
-    limits = limits.with_noise(noise_of_points(patches, kept, rise, rise))
+    # Only the ground's: of a slab that was seen from both sides half of the points are its underside.
+    limits = limits.with_noise(noise_of_points(patches, kept, patches.is_ground, rise, rise))
     patches = without_false_ground(settled(patches, kept, limits), limits, chosen.obstacle_points)
     patches, kept_noise = smoothed(patches, limits)
     patches = fitted(patches, kept, limits, kept_noise.is_less)
@@ -194,10 +196,12 @@ def _split(points: FloatArray, grid: Grid, chosen: SurfaceParameters, rise: floa
     offsets, ordered = sort_into_cells(points, by_height, grid.corner, grid.cell, grid.columns, grid.rows)
     thickest = chosen.slab_thickness + rise
     cells, firsts, ends, kinds = split_columns(ordered, offsets, chosen.clearance, thickest)
-    heights = first_heights(ordered, firsts, ends, kinds, rise)
     bottoms, tops = ordered[firsts, 2], ordered[ends - 1, 2]
-    standing = np.zeros(len(cells), dtype=np.int32)
-    return SurfacePatches(grid, cells, kinds, firsts, ends, bottoms, tops, heights, standing), ordered
+    unknown, standing = np.zeros(len(cells)), np.zeros(len(cells), dtype=np.int32)
+    patches = SurfacePatches(grid, cells, kinds, firsts, ends, bottoms, tops, unknown, standing)
+    patches = over_unseen_ground(patches, chosen.clearance, thickest)
+    heights = first_heights(ordered, firsts, ends, patches.kinds, np.array([rise, chosen.ground_thickness]))
+    return without_undersides(replace(patches, heights=heights), chosen.ground_thickness, rise), ordered
 
 
 def _is_large(patches: SurfacePatches, faces: IntArray, least_area: float) -> BoolArray:

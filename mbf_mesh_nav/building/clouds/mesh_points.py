@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.building.clouds.stored_points import StoredPoints
+from mbf_mesh_nav.building.clouds.undersides import below_all_ground
 from mbf_mesh_nav.files.mesh_io import HDF5_FORMATS, TRIMESH_FORMATS, read_mesh
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
@@ -54,16 +55,26 @@ def read_mesh_points(path: Path, max_points: int, up_axis: str, unit: float) -> 
     if area * density > max_points:
         text = f"{area:.6g} m² of faces need {area * density:.0f} samples, the limit is {max_points} (max_points)"
         raise MeshError(str(path), [text])
-    points = _samples(a, b - a, c - a, areas * density)
-    return StoredPoints(points, notes=(f"{len(faces)} faces sampled with {density:.0f} points/m²",))
+    points, face = _samples(a, b - a, c - a, areas * density)
+    notes = [f"{len(faces)} faces sampled with {density:.0f} points/m²"]
+    is_hidden = below_all_ground(vertices, faces, points, face)
+    if is_hidden.any():
+        points = points[~is_hidden]
+        notes.append(f"{np.count_nonzero(is_hidden)} samples left out, on the far side of solids with no ground below")
+    return StoredPoints(points, notes=tuple(notes))
 
 
-def _samples(corner: FloatArray, along: FloatArray, across: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Points (n, 3) on triangles (F, 3), of each ``wanted`` (F,) on average; what is left over goes to the next one."""
+def _samples(
+    corner: FloatArray, along: FloatArray, across: FloatArray, wanted: FloatArray
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Points (n, 3) on triangles (F, 3), and the triangle of each.
+
+    A triangle has ``wanted`` (F,) points on average; what is left over goes to the next one.
+    """
     ends = np.floor(np.cumsum(wanted)).astype(np.int64)
     face: NDArray[np.int64] = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
     number = np.arange(len(face), dtype=np.float64)
     u, v = (np.mod(number * step, 1.0)[:, None] for step in R2)
     is_outside = u + v > 1.0
     u, v = np.where(is_outside, 1.0 - u, u), np.where(is_outside, 1.0 - v, v)
-    return corner[face] + u * along[face] + v * across[face]
+    return corner[face] + u * along[face] + v * across[face], face

@@ -116,12 +116,17 @@ def split_columns(
 
 @kernel
 def first_heights(
-    points: FloatArray, firsts: NDArray[np.int64], ends: NDArray[np.int64], kinds: IntArray, band: float
+    points: FloatArray, firsts: NDArray[np.int64], ends: NDArray[np.int64], kinds: IntArray, bands: FloatArray
 ) -> FloatArray:
-    """Heights (P,) of patches before their slope is known: mean of the ``band`` [m] above the bottom, or below the top.
+    """Heights (P,) of patches before their slope is known: mean of a band above the bottom, or below the top.
 
     The lowest patch of a column is the ground, below whatever grows or stands on it. Of another one the upper
     side is driven on.
+
+    Parameters
+    ----------
+    bands : (2,) float64
+        Thickness of the band of the lowest patches, and of others, whose underside may have been seen, too [m].
     """
     heights = np.empty(firsts.shape[0], dtype=np.float64)
     for patch in range(firsts.shape[0]):
@@ -129,7 +134,7 @@ def first_heights(
         total, used = 0.0, 0
         for position in range(firsts[patch], ends[patch]):
             height = points[position, 2]
-            if (height <= bottom + band) if kinds[patch] == LOWEST else (height >= top - band):
+            if (height <= bottom + bands[0]) if kinds[patch] == LOWEST else (height >= top - bands[1]):
                 total += height
                 used += 1
         heights[patch] = total / used

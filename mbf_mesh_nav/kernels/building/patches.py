@@ -95,12 +95,14 @@ def settle_patches(
     centres: FloatArray,
     heights: FloatArray,
     slopes: FloatArray,
+    links: IntArray,
     limits: FloatArray,
 ) -> tuple[FloatArray, IntArray]:
     """Heights (P,) at the cells' centres along known slopes, and how many points stand on each patch (P,).
 
     Of the lowest patch of a column the points count that lie within a band above its lowest one; a single point below
-    all others does not count, it is an error of the sensor. Of the others the same is done from the top.
+    all others does not count, it is an error of the sensor. Of the others the same is done from the top, where a single
+    point counts that is as high as a linked neighbour: that of a slab of which mostly the underside was seen.
 
     Parameters
     ----------
@@ -118,13 +120,17 @@ def settle_patches(
             continue
         up = 1.0 if kinds[patch] == LOWEST else -1.0
         lowest = second = np.inf
+        outermost = firsts[patch]
         for position in range(firsts[patch], ends[patch]):
             above = up * _above(points, position, centres, patch, heights, slopes)
             if above < lowest:
-                lowest, second = above, lowest
+                lowest, second, outermost = above, lowest, position
             elif above < second:
                 second = above
-        floor = second if count > 2 and second - lowest > band else lowest
+        is_alone = count > 2 and second - lowest > band
+        if is_alone and kinds[patch] != LOWEST:
+            is_alone = not _is_beside(points, outermost, links, centres, patch, heights, slopes, band)
+        floor = second if is_alone else lowest
         total, used = 0.0, 0
         for position in range(firsts[patch], ends[patch]):
             above = up * _above(points, position, centres, patch, heights, slopes)
@@ -137,6 +143,25 @@ def settle_patches(
             above = up * (up * _above(points, position, centres, patch, heights, slopes) - mean)
             standing[patch] += step < above < clearance
     return settled, standing
+
+
+@inner_kernel
+def _is_beside(
+    points: FloatArray,
+    position: int,
+    links: IntArray,
+    centres: FloatArray,
+    patch: int,
+    heights: FloatArray,
+    slopes: FloatArray,
+    band: float,
+) -> bool:
+    """Whether a point is within ``band`` [m] of the plane of a linked neighbour."""
+    for direction in range(DIRECTIONS):
+        other = links[patch, direction]
+        if other >= 0 and abs(_above(points, position, centres, other, heights, slopes)) <= band:
+            return True
+    return False
 
 
 @inner_kernel

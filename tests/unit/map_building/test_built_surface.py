@@ -92,6 +92,16 @@ def test_a_bridge_and_the_road_below_it_are_one_map_on_two_levels(rng):
     assert parts_of(surface) == 2  # the road passes between the abutments: over the deck one does not come to it
 
 
+def test_storeys_whose_slabs_were_seen_from_both_sides_lie_on_their_tops_and_are_no_noise(rng):
+    heights = (0.0, 2.6, 3.0, 5.6, 6.0)  # a floor, and two slabs of 0.4 m
+    surface = build_surface(np.vstack([rectangle(rng, (0.0, 12.0), (0.0, 8.0), (z, z)) for z in heights]))
+    nearest = np.array((0.0, 3.0, 6.0))[np.rint(surface.vertices[:, 2] / 3.0).astype(int)]
+    np.testing.assert_allclose(surface.vertices[:, 2], nearest, atol=0.2)
+    assert np.std(surface.vertices[:, 2] - nearest) < 0.02
+    assert [np.count_nonzero(nearest == z) > 4000 for z in (0.0, 3.0, 6.0)] == [True, True, True]
+    assert np.percentile(surface.height_errors, 99.0) < 0.05
+
+
 def test_storeys_do_not_make_the_cells_smaller(rng):
     floor = ground(rng, flat)
     assert cell_for(floor) == cell_for(np.vstack([np.add(floor, (0.0, 0.0, 3.1 * level)) for level in range(4)])) == 0.2
