@@ -55,6 +55,7 @@ def map_findings(mesh_map: MeshMap) -> Iterator[Finding]:
     yield from _coarse(mesh_map)
     yield from _lethal(mesh_map)
     yield from _narrow(mesh_map)
+    yield from _bodies(mesh_map)
 
 
 def lying_findings(mesh_map: MeshMap, file: str, up_axis: str) -> Iterator[Finding]:
@@ -115,6 +116,21 @@ def _narrow(mesh_map: MeshMap) -> Iterator[Finding]:
                 "planners: they pass where the robot's body touches an obstacle, and controllers stop there"
             )
             yield Finding("narrow", text, NOWHERE, harmless=True)
+
+
+def _bodies(mesh_map: MeshMap) -> Iterator[Finding]:
+    """One finding if parts of the mesh are closed bodies, such as walls, which are not joined to the ground below."""
+    topology = mesh_map.topology
+    part_of_face = topology.components[topology.faces[:, 0]]
+    faces = np.bincount(part_of_face)
+    at_border = np.bincount(part_of_face, weights=(topology.face_neighbours < 0).any(axis=1))
+    bodies, parts = np.flatnonzero((faces > 0) & (at_border == 0)), int(np.count_nonzero(faces))
+    if len(bodies) and parts > 1:
+        text = (
+            f"{len(bodies)} of {parts} parts are closed bodies: where one, such as a wall, stands on the ground of "
+            "another one, a plan leads through it; mbf map build makes a surface that ends there"
+        )
+        yield Finding("bodies", text, np.flatnonzero(np.isin(topology.components, bodies)), harmless=True)
 
 
 def _lethal(mesh_map: MeshMap) -> Iterator[Finding]:

@@ -270,6 +270,16 @@ def test_the_radius_of_a_robot_says_what_is_coarse_unless_a_layer_stands_its_whe
     assert ("coarse" in mesh_map.report) is not wheels
 
 
+def test_closed_bodies_beside_other_parts_are_reported_as_plans_lead_through_them():
+    wall = trimesh.creation.box((0.1, 0.5, 0.5))
+    wall.apply_translation((0.5, 0.5, 0.3))
+    floor = trimesh.Trimesh(VERTICES, FACES, process=False)
+    for parts, expected in (([floor, wall], "1 of 2 parts are closed bodies"), ([floor], ""), ([wall], "")):
+        scene = trimesh.util.concatenate(parts)
+        report = build_mesh_map(MeshMapParameters(), vertices=scene.vertices, faces=scene.faces).report
+        assert report["bodies"].text.startswith(expected) if expected else "bodies" not in report
+
+
 def test_coarse_mesh_is_reported_and_densify_repairs_it():
     vertices, faces = heightfield_mesh(np.zeros((3, 3)), 2.0, 2.0)
     coarse = MeshMapParameters(inscribed_radius=0.4)
