@@ -82,14 +82,18 @@ class Path:
         object.__setattr__(self, "orientations", orientations)
 
     @classmethod
-    def of_checked_arrays(cls, positions: FloatArray, orientations: FloatArray, frame_id: str, stamp: float) -> Path:
+    def of_checked_arrays(
+        cls, positions: FloatArray, orientations: FloatArray, frame_id: str, stamp: float, guidance: Any = None
+    ) -> Path:
         """Take over arrays (n, 3) and (n, 4) float64 that a kernel has made for this path alone.
 
         They are neither copied nor checked: they must be finite, and the quaternions of unit length.
         """
         path = cls.__new__(cls)
         positions.flags.writeable = orientations.flags.writeable = False
-        vars(path).update(positions=positions, orientations=orientations, frame_id=frame_id, stamp=stamp, guidance=None)
+        vars(path).update(
+            positions=positions, orientations=orientations, frame_id=frame_id, stamp=stamp, guidance=guidance
+        )
         return path
 
     @classmethod

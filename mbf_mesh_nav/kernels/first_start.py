@@ -29,8 +29,8 @@ from mbf_mesh_nav.kernels.mesh.topology import (
     unit_vertex_normals,
 )
 from mbf_mesh_nav.kernels.motion.path_costs import way_cost
-from mbf_mesh_nav.kernels.motion.path_poses import poses_along
-from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, follow_predecessors, propagate_distances
+from mbf_mesh_nav.kernels.motion.path_poses import points_on_branch, poses_along
+from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, propagate_distances
 from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, link_faces
 from mbf_mesh_nav.kernels.wave.straight_corridors import straighten
 
@@ -65,7 +65,7 @@ def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
         (write_corner_weights, (listed, face_rows, listed, listed, costs, numbers, _example(np.float32, 2), octets)),
         (closest_face, (points, faces, rows, numbers, 0.0, 0.0, 0.0, 0.0, 0)),
         (propagate_distances, (graph, floats, numbers, numbers, 0.0, numbers, floats, octets, bound)),
-        (follow_predecessors, (numbers, 0)),
+        (points_on_branch, (numbers, 0, points, points, True)),
         (poses_along, (rows, rows, 0.0)),
         (closest_faces, (points, faces, rows, numbers, rows, _example(np.int64), 0.0)),
         (way_cost, (points, faces, costs, 0.0, rows, numbers)),

@@ -122,7 +122,7 @@ class StringPullingRefiner(MeshRefiner, MapRefiner):
         """Poses that look along the pulled points and stand on their faces; the last one stays as it is."""
         positions, faces = pulled[0].copy(), pulled[1]
         positions[[0, -1]] = path.positions[[0, -1]]
-        positions, orientations = poses_along(positions, self.mesh_map.face_normals[faces], SAME_POINT)
+        positions, orientations, _ = poses_along(positions, self.mesh_map.face_normals[faces], SAME_POINT)
         if path.orientations is not None:
             orientations[-1] = path.orientations[-1]
         return Path(positions, orientations, path.frame_id, path.stamp, path.guidance)

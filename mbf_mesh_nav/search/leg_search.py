@@ -13,7 +13,8 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, follow_predecessors, propagate_distances
+from mbf_mesh_nav.kernels.motion.path_poses import points_on_branch
+from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, propagate_distances
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
@@ -136,12 +137,9 @@ def vertex_path_leg(
     total, best = min(zip((distances[corners] + offsets).tolist(), corners.tolist(), strict=True), default=(np.inf, -1))
     if total == np.inf:
         return None
-    chain = follow_predecessors(predecessors, best)
-    if not rooted_at_goal:
-        chain = chain[::-1]
-    positions, normals = np.empty((len(chain) + 2, 3)), np.empty((len(chain) + 2, 3))
-    positions[0], positions[1:-1], positions[-1] = start.point, mesh_map.vertices.take(chain, axis=0), goal.point
-    normals[1:-1] = mesh_map.vertex_normals.take(chain, axis=0)
+    surface = mesh_map.vertices, mesh_map.vertex_normals
+    positions, normals = points_on_branch(predecessors, best, *surface, not rooted_at_goal)
+    positions[0], positions[-1] = start.point, goal.point
     normals[0], normals[-1] = mesh_map.face_normals[start.face], mesh_map.face_normals[goal.face]
     return Leg(positions, normals, total)
 

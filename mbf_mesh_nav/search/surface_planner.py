@@ -224,10 +224,11 @@ def path_of_legs(legs: Sequence[Leg], goal: Pose, ends_there: bool, frame_id: st
     normals = np.concatenate([legs[0].normals[:1]] + [leg.normals[1:] for leg in legs])
     if ends_there:
         positions[-1] = goal.position
-    positions, orientations = poses_along(positions, normals, SAME_POINT)
+    positions, orientations, sound = poses_along(positions, normals, SAME_POINT)
     orientations[-1] = goal.orientation
     guidance = tuple(leg.guidance for leg in legs if leg.guidance is not None) or None
-    return Path(positions, orientations, frame_id, stamp, guidance)
+    path = Path.of_checked_arrays if sound else Path
+    return path(positions, orientations, frame_id, stamp, guidance)
 
 
 def named_poses(request: PlanRequest) -> list[tuple[str, Pose]]:

@@ -6,15 +6,44 @@ import math
 
 import numpy as np
 
-from mbf_mesh_nav.arrays import FloatArray
-from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.arrays import FloatArray, IntArray
+from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, cross, difference, dot, row, set_row
+from mbf_mesh_nav.kernels.prefetch import prefetch
+
+_UNIT_TOLERANCE = 0.01  # of the squared norm of a quaternion, as a ``Path`` has it
 
 
 @kernel
-def poses_along(positions: FloatArray, normals: FloatArray, tolerance: float) -> tuple[FloatArray, FloatArray]:
+def points_on_branch(
+    predecessors: IntArray, vertex: int, vertices: FloatArray, vertex_normals: FloatArray, turned: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Positions and normals (n + 2, 3) from ``vertex`` back to the seed it was reached from, or ``turned`` from there.
+
+    The first and the last row are room for a start and a goal.
+    """
+    count, walker = Count(1), Count(vertex)
+    while predecessors[walker] >= 0:
+        prefetch(vertices, Index(walker))
+        prefetch(vertex_normals, Index(walker))
+        walker = Count(predecessors[walker])
+        count += 1
+    positions, normals = np.empty((count + 2, 3), dtype=np.float64), np.empty((count + 2, 3), dtype=np.float64)
+    walker = Count(vertex)
+    for place in range(1, count + 1):
+        target = count + 1 - place if turned else place
+        set_row(positions, target, row(vertices, walker))
+        set_row(normals, target, row(vertex_normals, walker))
+        walker = Count(predecessors[walker])
+    return positions, normals
+
+
+@kernel
+def poses_along(positions: FloatArray, normals: FloatArray, tolerance: float) -> tuple[FloatArray, FloatArray, bool]:
     """Positions (m, 3) and quaternions (m, 4), x y z w: each pose stands on its normal and looks to the next one.
+
+    Also whether all positions are finite and all quaternions of unit length.
 
     Both ends are kept, and of the points between what is farther than ``tolerance`` from the last one kept before;
     what comes that near to the end just before it is dropped, too. A path that passes the place where it ends keeps its
@@ -45,6 +74,7 @@ def poses_along(positions: FloatArray, normals: FloatArray, tolerance: float) ->
     count += 1
     points = np.empty((count, 3), dtype=np.float64)
     orientations = np.empty((count, 4), dtype=np.float64)
+    sound = True
     for place in range(count):
         point, up = row(positions, Count(kept[place])), row(normals, Count(kept[place]))
         following = row(positions, Count(kept[min(place + 1, count - 1)]))
@@ -52,7 +82,9 @@ def poses_along(positions: FloatArray, normals: FloatArray, tolerance: float) ->
         x, y, z, w = _quaternion(ahead, cross(up, ahead), up)
         set_row(points, place, point)
         orientations[place, 0], orientations[place, 1], orientations[place, 2], orientations[place, 3] = x, y, z, w
-    return points, orientations
+        sound &= abs(x * x + y * y + z * z + w * w - 1.0) <= _UNIT_TOLERANCE
+        sound &= math.isfinite(point[0]) and math.isfinite(point[1]) and math.isfinite(point[2])
+    return points, orientations, sound
 
 
 @inner_kernel

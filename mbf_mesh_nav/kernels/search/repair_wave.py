@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mbf_mesh_nav.arrays import Float32Array, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph
 
@@ -20,6 +20,7 @@ _FAR_AHEAD: Any = Index(96)  # places of the list, after which it will be known 
 _AHEAD: Any = Index(64)  # the same for its edges
 _NEAR_AHEAD: Any = Index(32)  # the same for the field at its first and last neighbour; the others lie between them
 _LAST: Any = Index(5)  # of the edges of most vertices, which are six; asking for what lies behind the end does no harm
+_MANY: Any = Index(8192)  # vertices listed since the list was looked through, which are still in the caches then
 _LISTED = -2  # as a predecessor: a changed vertex to which the walk has yet to come, or a root
 _NONE = -1
 
@@ -53,7 +54,7 @@ def invalidate_subtrees(
     """
     reset = np.empty(len(distances) + 1, dtype=np.int32)
     beside = np.empty(len(graph.neighbours) + 1, dtype=np.int32)
-    count, beside_count, reader = Index(0), Index(0), Index(0)
+    count, beside_count, reader, many = Index(0), Index(0), Index(0), _MANY
     for changed_vertex in changed:
         vertex = Index(changed_vertex)
         if predecessors[vertex] != _LISTED:
@@ -68,6 +69,9 @@ def invalidate_subtrees(
     while reader < count:
         vertex = Index(reset[reader])
         reader += ONE
+        if beside_count > many:
+            beside_count = _still_reached(beside, beside_count, distances)
+            many = beside_count + _MANY
         if reader + _FAR_AHEAD < count:
             ahead = Index(reset[reader + _FAR_AHEAD])
             prefetch(graph.offsets, ahead)
@@ -94,7 +98,8 @@ def invalidate_subtrees(
             count += Index(is_child)
             beside_count += Index((not is_child) & (before != _NONE))
     # 2. The wave starts again from the roots among them and from what stayed intact beside them.
-    seeds = np.empty(Index(len(roots)) + beside_count + ONE, dtype=np.int32)
+    beside_count = _still_reached(beside, beside_count, distances)
+    seeds = np.empty(Index(len(roots)) + beside_count, dtype=np.int32)
     seed_count = Index(0)
     for index in range(len(roots)):
         root = Index(roots[index])
@@ -105,7 +110,17 @@ def invalidate_subtrees(
             seeds[seed_count] = root
             seed_count += ONE
     for place in range(beside_count):
-        other = Index(beside[place])
-        seeds[seed_count] = other
-        seed_count += Index(distances[other] < np.inf)
+        seeds[seed_count] = beside[place]
+        seed_count += ONE
     return seeds[:seed_count].copy()
+
+
+@inner_kernel
+def _still_reached(listed: IntArray, count: int, distances: Float32Array) -> int:
+    """Take out, in place, of the first ``count`` vertices those that were reset since; return how many are left."""
+    kept: int = Index(0)
+    for place in range(count):
+        vertex = Index(listed[place])
+        listed[kept] = vertex
+        kept += Index(distances[vertex] < np.inf)
+    return kept

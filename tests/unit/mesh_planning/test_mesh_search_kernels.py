@@ -120,12 +120,15 @@ def slow_invalidation(graph, distances, predecessors, roots, root_distances, cha
     """The twin: all descendants one after the other, then in the same order whatever lies beside them."""
     around = lambda vertex: graph.neighbours[graph.offsets[vertex] : graph.offsets[vertex + 1]].tolist()  # noqa: E731
     reset = list(dict.fromkeys(changed.tolist()))
+    known = set(reset)
     for vertex in reset:
-        reset += [other for other in around(vertex) if predecessors[other] == vertex and other not in reset]
+        behind = [other for other in around(vertex) if predecessors[other] == vertex and other not in known]
+        known.update(behind)
+        reset += behind
     distances[reset], predecessors[reset] = np.inf, -1
     kept = [k for k, root in enumerate(roots) if root in reset and not graph.blocked[root]]
     distances[roots[kept]] = root_distances[kept]
-    beside = dict.fromkeys(other for vertex in reset for other in around(vertex) if other not in reset)
+    beside = dict.fromkeys(other for vertex in reset for other in around(vertex) if other not in known)
     return [*roots[kept].tolist(), *(other for other in beside if distances[other] < np.inf)]
 
 
@@ -133,10 +136,21 @@ def slow_invalidation(graph, distances, predecessors, roots, root_distances, cha
 @settings(max_examples=40, deadline=None)
 def test_what_lies_behind_a_change_is_reset_and_what_lies_beside_goes_on_from_there(seed, changed, root_count):
     """Of several roots one may be reached from another, as the corners of a goal's face are."""
-    _, *arrays = graph = random_grid_graph(seed, side=20)
-    roots = np.flatnonzero(~graph[-1])[:root_count].astype(np.int32)
-    ends = roots, np.arange(root_count, dtype=np.float32), np.array(changed, np.int32)
-    distances, predecessors = np.full(400, np.inf, np.float32), np.full(400, -1, np.int32)
+    assert same_invalidation(random_grid_graph(seed, side=20), root_count, np.array(changed, np.int32)) <= 400
+
+
+def test_a_large_shadow_is_reset_and_what_lies_beside_is_listed_in_the_same_order():
+    """More than the list of those beside holds before it is looked through."""
+    assert same_invalidation(random_grid_graph(5, side=150), 1, np.arange(150, 300, dtype=np.int32)) > 15_000
+
+
+def same_invalidation(graph_of_vertices, root_count, changed):
+    """Whether the kernel does what its twin does; the number of vertices that both have reset."""
+    _, *arrays = graph_of_vertices
+    roots = np.flatnonzero(~arrays[-1])[:root_count].astype(np.int32)
+    ends = roots, np.arange(root_count, dtype=np.float32), changed
+    count = len(arrays[-1])
+    distances, predecessors = np.full(count, np.inf, np.float32), np.full(count, -1, np.int32)
     distances[roots] = ends[1]
     assert propagate_distances(SearchGraph(*arrays), distances, predecessors, roots, 2.0, NO_INTS, NO_FLOATS, CALM)
     slow = distances.copy(), predecessors.copy()
@@ -144,6 +158,7 @@ def test_what_lies_behind_a_change_is_reset_and_what_lies_beside_goes_on_from_th
     assert list(dict.fromkeys(seeds.tolist())) == slow_invalidation(SearchGraph(*arrays), *slow, *ends)
     np.testing.assert_array_equal(distances, slow[0])
     np.testing.assert_array_equal(predecessors, slow[1])
+    return int(np.isinf(distances).sum())
 
 
 @given(seed=st.integers(0, 10**6), step=st.floats(0.01, 20.0))
