@@ -97,6 +97,11 @@ class PathFollower(CostmapController):
         """Largest speed [m/s] where no layer limits it; every controller that drives has one."""
         return math.inf
 
+    @property
+    def is_leaving(self) -> bool:
+        """Whether the robot is leaving a contact; those that leave none never are."""
+        return False
+
     def checked_footprint(self) -> Footprint:
         """Outline that must not touch a lethal cell; the costmap's padded one. A new object means a new outline."""
         return self.costmap.footprint
@@ -144,7 +149,7 @@ class PathFollower(CostmapController):
         factor = self.relaxation.slack(self.clock.now()).controller_factor
         parameters: Any = self.parameters
         farthest = parameters.max_path_distance if hasattr(parameters, "max_path_distance") else math.inf
-        if missed := missed_path(tracker, farthest * factor):
+        if (missed := missed_path(tracker, farthest * factor)) and not self.is_leaving:
             return missed
         tolerance = self.goal_dist_tolerance
         return ControlCycle(request, tracker, costmap, self._footprint, tolerance, limit, factor, touches)

@@ -47,6 +47,11 @@ class SamplingFollower(PathFollower):
         super().__init__(context)
         self._keeping = KeepingToPath(context)
 
+    @property
+    def is_leaving(self) -> bool:
+        """Whether the robot is leaving a contact."""
+        return self._keeping.is_leaving
+
     @abstractmethod
     def limits(self, cycle: ControlCycle) -> MotionLimits:
         """What it may command in this cycle."""

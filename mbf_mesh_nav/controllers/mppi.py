@@ -131,7 +131,8 @@ class MPPIController(SamplingFollower):
             self._begin(spot, pose)
         self._tracker.update(spot.point)
         limits = self._motions.limits
-        if missed := missed_path(self._tracker, p.max_path_distance * self.limit_factor):
+        missed = missed_path(self._tracker, p.max_path_distance * self.limit_factor)
+        if missed and not self._keeping.is_leaving:
             return missed
         if approach.is_only_turning(pose, self._tracker):
             return self._turn_at_goal(pose, approach)

@@ -99,7 +99,8 @@ class PathFollower(LeavesContacts, SurfaceFollower):
         surface, approach = cycle
         self._tracker.update(surface.point)
         is_turning = approach.is_only_turning(pose, self._tracker)
-        if missed := missed_path(self._tracker, self.parameters.max_path_distance * self.limit_factor):
+        missed = missed_path(self._tracker, self.parameters.max_path_distance * self.limit_factor)
+        if missed and not self.is_leaving:
             return missed
         if not is_turning and (out := self._way_out(pose)) is not None:
             return self._command(out.vx, out.wz)

@@ -1,12 +1,14 @@
 """How a robot that touches something on a mesh may move: nothing deeper, and nothing else.
 
-When to use: where the robot stands on ground that is forbidden because of lethal vertices near by. When not: on free
-ground, or ground that only costs too much, where ``kernels.search.forbidden_surface`` has the rule.
+When to use: where the robot stands on ground that is forbidden because of lethal vertices near by, or nearer to one
+than its radius. When not: on other ground, where ``kernels.search.forbidden_surface`` has the rule.
 
 Within the inscribed radius all ground costs the same, and where it begins is a line of teeth as wide as an edge. So a
 rank by cost neither forbids to press deeper into a wall, nor allows to leave it at a small angle, over the next tooth.
 What counts is the distance of the centre from the nearest lethal vertex, thing by thing, as on costmaps: lethal
-vertices that are joined by edges are one thing. Between the corners of a face that distance is interpolated.
+vertices that are joined by edges are one thing. Between the corners of a face that distance is interpolated. Ground is
+free where the nearest vertex is, so beside a corner of a wall a robot touches it on free ground, too; but only where
+the map is inflated: on others plans lead nearer to lethal vertices.
 """
 
 from __future__ import annotations
@@ -50,7 +52,9 @@ class Contact:
         self, mesh: MeshTopology, ranks: Float32Array, things: list[FloatArray], place: SurfacePoint, reach: float
     ) -> None:
         self._mesh, self._ranks, self._things, self._reach = mesh, ranks, things, reach
-        self._rank = self._rank_of(place.face, place.barycentric)
+        # On free ground at the edge of forbidden ground that of the teeth: it may be the next one that it leaves over.
+        corners = ranks[mesh.faces[place.face]]
+        self._rank = self._rank_of(place.face, place.barycentric) or float(corners[corners < LETHAL_RANK].max())
         self._limits = self._depths(place.face, place.barycentric)
         self._rounding = ROUNDING * mesh.mean_edge_length
 
@@ -59,11 +63,17 @@ class Contact:
         cls, mesh: MeshTopology, ranks: Float32Array, place: SurfacePoint, radius: float, travel: float
     ) -> Contact | None:
         """The contact of a robot of a ``radius`` [m] that is about to drive ``travel`` [m]; None if it is in none."""
-        if rank_at(mesh.vertices, mesh.faces, ranks, place.face, vector_of(place.point)) <= 0.0:
+        corners = ranks[mesh.faces[place.face]]
+        if not corners.any():
             return None
-        reach = radius + TOOTH * mesh.mean_edge_length
         graph = (mesh.vertices, mesh.neighbour_offsets, mesh.neighbours)
-        start = int(mesh.faces[place.face, np.argmax(place.barycentric)])
+        nearest = int(np.argmax(place.barycentric))
+        start = int(mesh.faces[place.face, nearest])
+        if corners[nearest] == 0.0:
+            inflated = bool(((corners > 0.0) & (corners < LETHAL_RANK)).any())
+            if not inflated or (ranks[vertices_in_disc(*graph, start, place.point, radius)] < LETHAL_RANK).all():
+                return None
+        reach = radius + TOOTH * mesh.mean_edge_length
         near = vertices_in_disc(*graph, start, place.point, float(reach + travel + 2.0 * mesh.mean_edge_length))
         lethal = near[ranks[near] >= LETHAL_RANK]
         found = cls(mesh, ranks, things_of(mesh, lethal), place, reach)
@@ -98,11 +108,11 @@ class Contact:
 
 
 def contact_depth(mesh: MeshTopology, ranks: Float32Array, place: SurfacePoint, radius: float) -> float:
-    """How deep [m] a robot of a ``radius`` [m] lies in what it touches at a place; 0 on free ground."""
-    if rank_at(mesh.vertices, mesh.faces, ranks, place.face, vector_of(place.point)) <= 0.0:
-        return 0.0
+    """How deep [m] a robot of a ``radius`` [m] lies in what it touches at a place; 0 where it touches nothing."""
     contact = Contact.at(mesh, ranks, place, radius, 0.0)
-    return LEAST if contact is None else max(contact.depth, LEAST)
+    if contact is None:
+        return LEAST if rank_at(mesh.vertices, mesh.faces, ranks, place.face, vector_of(place.point)) > 0.0 else 0.0
+    return max(contact.depth, LEAST)
 
 
 def things_of(mesh: MeshTopology, vertices: IntArray) -> list[FloatArray]:

@@ -62,7 +62,7 @@ def forbidden_ahead(
     """
     face, point = place.face, vector_of(place.point)
     stands_on = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
-    contact = Contact.at(mesh, ranks, place, radius, command.speed * duration) if stands_on > 0.0 else None
+    contact = Contact.at(mesh, ranks, place, radius, command.speed * duration)
     if command.speed == 0.0:
         blocked = command.wz != 0.0 and stands_on >= LETHAL_RANK
         return f"the robot stands on an obstacle at {position_text(point)}" if blocked else ""

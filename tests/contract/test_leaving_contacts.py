@@ -66,6 +66,29 @@ def test_depth_is_none_where_nothing_is_touched_and_grows_towards_the_obstacle(w
     assert depths[4] - depths[2] == pytest.approx(0.07, abs=0.03)
 
 
+def test_whoever_reaches_over_the_corner_of_a_pillar_touches_it(world):
+    """On a mesh the centre of such a robot is often on ground that is free, as the nearest vertex is."""
+    navigation_map, rng = world.inflated(pillar), np.random.default_rng(0)
+    for _ in range(200):
+        right, above = (bool(rng.integers(2)) for _ in range(2))
+        angle = rng.uniform(0.0, 0.5 * math.pi)
+        distance = RADIUS - rng.uniform(0.002, 0.02)
+        x = HIGH[0] + distance * math.cos(angle) if right else LOW[0] - distance * math.cos(angle)
+        y = HIGH[1] + distance * math.sin(angle) if above else LOW[1] - distance * math.sin(angle)
+        pose = Pose.planar(float(x), float(y), rng.uniform(-math.pi, math.pi))
+        assert 0.0 < navigation_map.contact_depth(pose) < 0.1, pose
+
+
+def test_who_turns_drives_out_as_soon_as_that_leads_out(world):
+    """Somebody stood in the way when it chose to turn, and has left."""
+    busy = world.inflated(lambda x, y: pillar(x, y) | (np.hypot(x - 2.5, y - 2.2) < 0.15))
+    free, way, turns = world.inflated(pillar), WayOut(), []
+    pose = Pose.planar(2.83, 2.52, -2.4)
+    turn = lambda angle: turns.append(angle) or Twist.planar(wz=1.0)  # noqa: E731
+    assert way.command(busy, pose, -2.0, turn, Gears(), leads_out).wz == 1.0 and turns
+    assert way.command(free, pose, -2.0, turn, Gears(), leads_out).vx > 0.0
+
+
 def test_who_leads_out_steeply_drives_straight_else_it_turns(world):
     navigation_map, turns = world.inflated(pillar), []
 
@@ -108,6 +131,32 @@ def test_a_way_is_kept_until_the_robot_is_clear(world):
         assert command.wz == 0.0 and driven < 0.3
     assert navigation_map.contact_depth(pose) == 0.0 and driven > 0.05
     assert navigation_map.contact_depth(Pose.planar(pose.x + 0.02, pose.y)) == 0.0, "not only just"
+
+
+def test_no_controller_stops_half_way_out_because_it_gets_far_from_its_path(world):
+    start = Pose.planar(4.16, 2.52, 0.8)
+    for name in CONTROLLERS[world.backend]:
+        navigation_map = world.inflated(pillar)
+        assert navigation_map.contact_depth(start) > 0.0
+
+        def make_context(base, navigation_map=navigation_map):
+            return world.context(**vars(base), navigation_map=navigation_map)
+
+        plugin = PluginRegistry(world.backend).load(PluginKind.CONTROLLER, name)
+        with rig(plugin, make_context, None, start) as made:
+            farthest = getattr(made.plugin.parameters, "max_path_distance", 1.0)
+            xs, far = np.linspace(2.5, 7.0, 91), start.y - min(farthest, 1.0) + 0.02
+            assert made.plugin.set_plan(Path(np.column_stack([xs, np.full(91, far), 0.0 * xs])))
+            pose, velocity = start, Twist()
+            for _ in range(round(8.0 / PERIOD)):
+                result = made.plugin.compute_velocity_commands(ControlRequest(pose, velocity))
+                assert result.success, (name, pose, result.message)
+                velocity = result.command
+                pose = moved(pose, velocity)
+                made.clock.sleep(PERIOD)
+                if navigation_map.contact_depth(pose) == 0.0:
+                    break
+        assert navigation_map.contact_depth(pose) == 0.0, (name, pose)
 
 
 @pytest.mark.parametrize("seed", range(6))

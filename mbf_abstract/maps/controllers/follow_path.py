@@ -91,7 +91,8 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
         tracker.update((pose.x, pose.y))
         self._update_end(pose, tracker)
         farthest = p.max_path_distance * self.relaxation.slack(self.clock.now()).controller_factor
-        if missed := missed_path(tracker, farthest, storeys_off(pose, tracker, self.navigation_map)):
+        above = storeys_off(pose, tracker, self.navigation_map)
+        if not self.is_leaving and (missed := missed_path(tracker, farthest, above)):
             return missed
 
         def blocked(motion: Twist) -> str:
@@ -159,8 +160,7 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
             return curves_ahead(self._turn(error), error, backward)
         left = max(tracker.to_cusp, gap if tracker.on_last_section else 0.0)
         speed = min(p.max_vel_x, p.max_vel_theta / max(abs(curvature), 1e-6), math.sqrt(2.0 * p.decel_lim_x * left))
-        speed = max(speed, min(MIN_SPEED, p.max_vel_x))
-        speed = -speed if backward else speed
+        speed = max(speed, min(MIN_SPEED, p.max_vel_x)) * (-1.0 if backward else 1.0)
         turn = max(-p.max_vel_theta, min(speed * curvature, p.max_vel_theta))
         return wider_curves(Twist.planar(vx=speed, wz=turn))
 

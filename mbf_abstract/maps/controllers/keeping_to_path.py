@@ -94,6 +94,11 @@ class KeepingToPath:
         self.is_keeping = False
         """Whether the last command was one along the path."""
 
+    @property
+    def is_leaving(self) -> bool:
+        """Whether the robot is leaving a contact."""
+        return self._follower.is_leaving
+
     def drive_with(self, max_vel_x: float, max_vel_theta: float, *, allow_reversing: bool) -> None:
         """Take over the limits [m/s, rad/s] of the controller."""
         self._follower.parameters = FollowPathParameters(

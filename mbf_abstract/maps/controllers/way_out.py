@@ -43,43 +43,37 @@ CLEAR = 0.03
 """So far [m] it drives on straight once it touches nothing."""
 ELSEWHERE, TURNED = 0.1, 0.3
 """A robot that is so far [m, rad] from where it was asked last has been driven by somebody else."""
+BEGUN = 0.01
+"""A robot that has turned by more [rad] since it chose does as it chose."""
 SAME_PLACE = 0.2
 """A robot that begins anew within this [m] of where it began last has come back: every second time it turns first."""
 
 
 @dataclass(frozen=True)
 class Gears:
-    """How a robot may drive out.
-
-    Attributes
-    ----------
-    backward : bool
-        Whether its path is to be driven backward.
-    reverses : bool
-        Whether it may drive out both ways.
-    leaves_faces : bool
-        Whether it turns off a little, up to 0.5 rad, from a path that leads along what it touches, and does not
-        lead out.
-    """
+    """How a robot may drive out."""
 
     backward: bool = False
+    """Whether its path is to be driven backward."""
     reverses: bool = False
+    """Whether it may drive out both ways."""
     leaves_faces: bool = False
+    """Whether it turns off a little, up to 0.5 rad, from a path that leads along what it touches, and not out."""
 
 
 class WayOut:
     """The way a robot has chosen out of what it touches, from cycle to cycle."""
 
     def __init__(self) -> None:
-        self._heading = self._speed = 0.0
-        self._last: Pose | None = None
+        self._heading = self._speed = self._chose_at = 0.0
+        self.last: Pose | None = None  # where it was asked last; None where it has chosen no way
         self._free_at: Pose | None = None
         self._began: Pose | None = None
         self._turns_first = False
 
     def concerns(self, navigation_map: NavigationMap, pose: Pose) -> bool:
         """Whether a robot at ``pose``, in the frame of the map, touches something, or is not clear since it did."""
-        return self._last is not None or navigation_map.contact_depth(pose) > 0.0
+        return self.last is not None or navigation_map.contact_depth(pose) > 0.0
 
     def command(
         self,
@@ -103,8 +97,8 @@ class WayOut:
         on_path : callable
             See ``OnPath``.
         """
-        depth, last = navigation_map.contact_depth(pose), self._last
-        self._last = None
+        depth, last = navigation_map.contact_depth(pose), self.last
+        self.last = None
         if last is None and depth == 0.0:
             return None
         self._free_at = (self._free_at or pose) if depth == 0.0 else None
@@ -116,7 +110,7 @@ class WayOut:
             if last is None:
                 returns = self._began is not None and pose.distance_to(self._began) <= SAME_PLACE
                 self._began, self._turns_first = pose, returns and not self._turns_first
-            gears = replace(gears, reverses=gears.reverses and not self._turns_first)
+            gears = self._gears(gears)
             leads = path_leads(navigation_map, depth, on_path(max(WITHIN, DEPTHS * depth))) if depth > 0.0 else INTO
             chosen = None
             if leads == OUT:
@@ -127,14 +121,27 @@ class WayOut:
                 return None
             angle, self._speed = chosen
             self._heading = pose.yaw + angle
-        self._last = pose
+            self._chose_at = pose.yaw
+        elif self._has_not_begun(pose) and (speed := _straight_out(navigation_map, pose, self._gears(gears), depth)):
+            self._heading, self._speed = pose.yaw, speed  # who was in the way has left
+        self.last = pose
+        angle = self._turns_from(pose)
+        return turn(angle) if angle != 0.0 else Twist.planar(self._speed)
+
+    def _turns_from(self, pose: Pose) -> float:
+        """The angle [rad] that is left to turn by; 0 where the robot drives straight."""
         angle = normalize_angle(self._heading - pose.yaw)
-        return turn(angle) if abs(angle) > SMALL_TURN else Twist.planar(self._speed)
+        return angle if abs(angle) > SMALL_TURN else 0.0
+
+    def _has_not_begun(self, pose: Pose) -> bool:
+        """Whether it is to turn and has not: whoever walks by may have to pass first."""
+        return self._turns_from(pose) != 0.0 and abs(normalize_angle(pose.yaw - self._chose_at)) <= BEGUN
+
+    def _gears(self, gears: Gears) -> Gears:
+        return replace(gears, reverses=gears.reverses and not self._turns_first)
 
     def _goes_on(self, navigation_map: NavigationMap, pose: Pose, depth: float) -> bool:
-        angle = normalize_angle(self._heading - pose.yaw)
-        angle = angle if abs(angle) > SMALL_TURN else 0.0
-        return _leads_out(navigation_map, pose, angle, self._speed, max(WITHIN, DEPTHS * depth))
+        return _leads_out(navigation_map, pose, self._turns_from(pose), self._speed, max(WITHIN, DEPTHS * depth))
 
 
 class LeavesContacts:
@@ -144,6 +151,11 @@ class LeavesContacts:
     def leaving(self) -> WayOut:
         """How it leaves the present contact."""
         return WayOut()
+
+    @property
+    def is_leaving(self) -> bool:
+        """Whether the robot has begun to; it does not stop half way, however far it gets from its path."""
+        return self.leaving.last is not None
 
 
 class OnPath:
@@ -198,11 +210,16 @@ def _choose(
     navigation_map: NavigationMap, pose: Pose, bearing: float, gears: Gears, depth: float
 ) -> tuple[float, float] | None:
     """Angle [rad] to turn by, and the speed [m/s] of the straight drive after it; None if nothing leads out."""
-    speed = -CREEPING if gears.backward else CREEPING
-    for straight in (speed, -speed) if gears.reverses else (speed,):
-        if _leads_out(navigation_map, pose, 0.0, straight, max(AT_LEAST, STEEP * depth)):
-            return 0.0, straight
+    if straight := _straight_out(navigation_map, pose, gears, depth):
+        return 0.0, straight
     return _turn_off(navigation_map, pose, bearing, gears, depth, OFF_PATH)
+
+
+def _straight_out(navigation_map: NavigationMap, pose: Pose, gears: Gears, depth: float) -> float:
+    """The speed [m/s] of a straight drive that leads out steeply; 0 if none does."""
+    speed, within = -CREEPING if gears.backward else CREEPING, max(AT_LEAST, STEEP * depth)
+    both = (speed, -speed) if gears.reverses else (speed,)
+    return next((straight for straight in both if _leads_out(navigation_map, pose, 0.0, straight, within)), 0.0)
 
 
 def _turn_off(
