@@ -69,7 +69,8 @@ def build_map(
         raise MeshError(str(out), ["there is no such folder"])
     if any(file.exists() and out.exists() and file.samefile(out) for file in files):
         raise MeshError(str(out), ["is one of the inputs, which are never changed"])
-    is_decimated = parameters is not None and parameters.decimation_bound > 0.0
+    parameters = parameters or SurfaceParameters()
+    is_decimated = parameters.decimation_bound > 0.0
     if is_decimated:
         require_simplification()
     cloud = read_clouds(
@@ -79,6 +80,7 @@ def build_map(
         crs=crs,
         max_points=max_points,
         drop_invalid=drop_invalid,
+        clearance=parameters.clearance,
         on_file=lambda file: on_step(f"reading {file.name}"),
     )
     try:
@@ -87,7 +89,7 @@ def build_map(
         raise MeshError(", ".join(map(str, files)), error.reasons, error.hint) from error
     facts, errors = map_facts(cloud, surface), VertexErrors(surface.height_errors, surface.place_errors)
     mesh = DecimatedMesh(surface.vertices, surface.faces)
-    if parameters is not None and is_decimated:
+    if is_decimated:
         on_step("decimation")
         mesh = decimated(surface.vertices, surface.faces, parameters.decimation_bound)
         errors = carried_errors(mesh, surface.vertices, surface.faces, errors)

@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from mbf_abstract.geometry.arithmetic import tan
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
+from mbf_mesh_nav.building.clouds.point_cloud import CLEARANCE
 from mbf_mesh_nav.building.height_errors import height_errors
 from mbf_mesh_nav.building.heights import HeightLimits, fitted, noise_of_points, settled, smoothed, without_false_ground
 from mbf_mesh_nav.building.holes import without_holes
@@ -44,7 +45,7 @@ class SurfaceParameters(ParameterModel):
         4, "Points with fewer points around them are errors; 1 = keep all. Around is up to twice the cell.", ge=1
     )
     clearance: float = parameter(
-        1.5, "Free height that the robot needs; points above that are not obstacles.", unit="m", gt=0.1, le=20.0
+        CLEARANCE, "Free height that the robot needs; points above that are not obstacles.", unit="m", gt=0.1, le=20.0
     )
     step_height: float = parameter(
         0.2, "What stands up to this height is driven over, such as grass.", unit="m", ge=0.02, le=2.0

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.building.clouds.stored_points import StoredPoints
-from mbf_mesh_nav.building.clouds.undersides import below_all_ground
+from mbf_mesh_nav.building.clouds.undersides import out_of_reach
 from mbf_mesh_nav.files.mesh_io import HDF5_FORMATS, TRIMESH_FORMATS, read_mesh
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
@@ -25,13 +25,15 @@ LEAST_DENSITY = 100.0
 R2 = (0.7548776662466927, 0.5698402909980532)
 
 
-def read_mesh_points(path: Path, max_points: int, up_axis: str, unit: float) -> StoredPoints:
+def read_mesh_points(path: Path, max_points: int, up_axis: str, unit: float, clearance: float) -> StoredPoints:
     """Sample the faces of a mesh file.
 
     Parameters
     ----------
     up_axis, unit
         As in ``files.mesh_io.read_mesh``.
+    clearance : float
+        Free height [m] that the robot needs below what solids carry.
 
     Returns
     -------
@@ -57,10 +59,11 @@ def read_mesh_points(path: Path, max_points: int, up_axis: str, unit: float) -> 
         raise MeshError(str(path), [text])
     points, face = _samples(a, b - a, c - a, areas * density)
     notes = [f"{len(faces)} faces sampled with {density:.0f} points/m²"]
-    is_hidden = below_all_ground(vertices, faces, points, face)
+    is_hidden = out_of_reach(vertices, faces, points, face, clearance)
     if is_hidden.any():
         points = points[~is_hidden]
-        notes.append(f"{np.count_nonzero(is_hidden)} samples left out, on the far side of solids with no ground below")
+        text = "on solids with no ground below, or less than the clearance above it"
+        notes.append(f"{np.count_nonzero(is_hidden)} samples left out, {text}")
     return StoredPoints(points, notes=tuple(notes))
 
 

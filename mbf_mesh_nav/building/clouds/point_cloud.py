@@ -43,6 +43,8 @@ READERS: dict[str, Reader] = {
 """Readers by the ending of the file."""
 MAX_POINTS = 50_000_000
 """Points of all files together unless the caller asks for more; each takes some hundred bytes while a map is built."""
+CLEARANCE = 1.5
+"""Free height [m] unless the caller needs another one."""
 FAR = 10_000.0
 """Coordinates [m] beyond this are of a grid of a country: the map gets an origin of its own."""
 ORIGIN_STEP = 100.0
@@ -81,6 +83,7 @@ def read_clouds(
     crs: str = "",
     max_points: int = MAX_POINTS,
     drop_invalid: bool = False,
+    clearance: float = CLEARANCE,
     on_file: Callable[[Path], None] = lambda file: None,
 ) -> PointCloud:
     """Read one or several files, or folders of runs, as one cloud; their order does not matter for its coordinates.
@@ -98,6 +101,8 @@ def read_clouds(
         Files of more points, together, are refused before their points are read.
     drop_invalid : bool
         Leave out points that are not finite; without it they are an error.
+    clearance : float
+        Free height that the robot needs [m]; in lower gaps of solids, such as below a ramp, nothing is sampled.
     on_file : callable, optional
         Called with each file before it is read. What it raises ends the reading.
 
@@ -114,7 +119,7 @@ def read_clouds(
     systems = dict[str, str]()
     for file in files:
         on_file(file)
-        stored, is_on_map = _read(file, max_points - sum(map(len, parts)), up_axis, unit)
+        stored, is_on_map = _read(file, max_points - sum(map(len, parts)), up_axis, unit, clearance)
         points, dropped = _finite(file, stored.points, drop_invalid)
         stated[file] = unit or stored.unit
         if stored.crs:
@@ -157,7 +162,7 @@ def _judge_systems(systems: dict[str, str], given: str, crs: str) -> list[str]:
     return [f"{name} states {one}, the map keeps {given} as given" for one, name in systems.items() if one != given]
 
 
-def _read(file: Path, max_points: int, up_axis: str, unit: float) -> tuple[StoredPoints, bool]:
+def _read(file: Path, max_points: int, up_axis: str, unit: float, clearance: float) -> tuple[StoredPoints, bool]:
     """Contents of a file, or of the folder of a run, and whether they are in metres with z up already."""
     if file.is_dir():
         return read_run_points(file, max_points), True
@@ -174,7 +179,10 @@ def _read(file: Path, max_points: int, up_axis: str, unit: float) -> tuple[Store
         raise MeshError(str(file), ["there is no such file"])
     try:
         is_mesh = ending in MESH_ENDINGS or (ending == ".ply" and has_faces(file))
-        stored = read_mesh_points(file, max_points, up_axis, unit) if is_mesh else READERS[ending](file, max_points)
+        if is_mesh:
+            stored = read_mesh_points(file, max_points, up_axis, unit, clearance)
+        else:
+            stored = READERS[ending](file, max_points)
     except (OSError, MemoryError, ValueError) as error:
         if isinstance(error, MeshError):
             raise

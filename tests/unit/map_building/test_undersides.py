@@ -5,8 +5,9 @@ import pytest
 import trimesh
 
 from mbf_mesh_nav.building.clouds.point_cloud import read_clouds
-from mbf_mesh_nav.building.clouds.undersides import below_all_ground
+from mbf_mesh_nav.building.clouds.undersides import out_of_reach
 from mbf_mesh_nav.building.surface import build_surface
+from mbf_mesh_nav.map.mesh_map import MeshMap
 
 
 def slab(x, y, top, thickness=0.3, size=(12.0, 8.0)):
@@ -22,8 +23,9 @@ def surface_of(parts, file):
     return build_surface(cloud.points), cloud.notes
 
 
-def hidden(mesh, points, faces):
-    return below_all_ground(np.asarray(mesh.vertices), np.asarray(mesh.faces), np.asarray(points), np.asarray(faces))
+def hidden(mesh, points, faces, clearance=1.5):
+    arrays = (np.asarray(mesh.vertices), np.asarray(mesh.faces), np.asarray(points), np.asarray(faces))
+    return out_of_reach(*arrays, clearance)
 
 
 @pytest.mark.parametrize("thickness", [0.05, 0.3, 0.5, 2.0])
@@ -35,7 +37,7 @@ def test_the_top_of_a_slab_is_the_ground_however_thick_it_is(thickness, turned, 
     surface, notes = surface_of([box], tmp_path / "slab.off")
     np.testing.assert_allclose(surface.vertices[:, 2], 0.0, atol=1e-9)
     assert len(surface.faces) * 0.5 * surface.patches.grid.cell**2 == pytest.approx(96.0, rel=0.05)
-    assert notes[1].endswith("samples left out, on the far side of solids with no ground below")
+    assert notes[1].endswith("samples left out, on solids with no ground below, or less than the clearance above it")
 
 
 def test_a_ground_closed_far_below_as_by_poissons_method_is_the_ground_alone(tmp_path):
@@ -75,7 +77,33 @@ def test_open_meshes_are_sampled_on_both_sides_as_nobody_knows_which_one_is_up()
     assert not hidden(lid, points[on_lid], faces[on_lid] - 1).any()
 
 
-def test_what_is_hidden_is_what_no_upward_face_lies_below_by_a_search_of_all_faces():
+def test_a_ramp_that_begins_on_the_floor_leads_to_the_storey_above_it(tmp_path):
+    ramp = slab(2.0, 3.0, top=0.0, size=(12.0, 3.0))
+    ramp.vertices[:, 2] += 2.4 / 12.0 * (ramp.vertices[:, 0] - 2.0)
+    parts = [slab(0.0, 0.0, top=0.0, size=(20.0, 9.0)), ramp, slab(14.0, 0.0, top=2.4, size=(6.0, 9.0))]
+    surface, _ = surface_of(parts, tmp_path / "ramp.off")
+    mesh_map = MeshMap.from_arrays(surface.vertices, surface.faces)
+    start, top = (mesh_map.locate_one(place).face for place in ((1.0, 4.5, 0.0), (17.0, 4.5, 2.4)))
+    assert (
+        mesh_map.topology.components[mesh_map.faces[start, 0]] == mesh_map.topology.components[mesh_map.faces[top, 0]]
+    )
+    x, _, z = surface.vertices[(surface.vertices[:, 1] > 3.5) & (surface.vertices[:, 1] < 5.5)].T
+    on_ramp = (x > 2.5) & (x < 13.5) & (z > 0.1 * (x - 2.0))
+    np.testing.assert_allclose(z[on_ramp], 0.2 * (x[on_ramp] - 2.0), atol=0.06)
+    assert not ((x > 2.5) & (x < 8.0) & ~on_ramp).any()  # below the ramp a robot does not fit
+
+
+def hits(mesh, chosen, point, up):
+    """Distances from a point straight up or down to the chosen triangles, one by one."""
+    for a, b, c in mesh.triangles[chosen]:
+        corners = np.vstack([np.column_stack([a, b, c])[:2], np.ones(3)])
+        weights = np.linalg.solve(corners, [point[0], point[1], 1.0])
+        distance = up * (weights @ (a[2], b[2], c[2]) - point[2])
+        if (weights >= 0.0).all() and distance >= 0.0:
+            yield distance
+
+
+def test_what_is_hidden_is_so_by_a_search_of_all_faces():
     rng = np.random.default_rng(5)
     parts = [trimesh.creation.box(rng.uniform(0.5, 3.0, 3)) for _ in range(12)]
     for part in parts:
@@ -83,13 +111,15 @@ def test_what_is_hidden_is_what_no_upward_face_lies_below_by_a_search_of_all_fac
         part.apply_translation(rng.uniform(0.0, 6.0, 3))
     mesh = trimesh.util.concatenate(parts)
     points, faces = mesh.sample(1500, return_index=True, seed=7)
-    mask = hidden(mesh, points, faces)
-    looks_up = mesh.face_normals[:, 2] > 0.1
-    for point, face, is_hidden in zip(points, faces, mask, strict=True):
-        below = False
-        for a, b, c in mesh.triangles[looks_up]:
-            weights = np.linalg.solve(
-                np.vstack([np.column_stack([a, b, c])[:2], np.ones(3)]), [point[0], point[1], 1.0]
-            )
-            below |= bool((weights >= 0.0).all() and weights @ (a[2], b[2], c[2]) <= point[2])
-        assert is_hidden == (not looks_up[face] and not below)
+    mask = hidden(mesh, points, faces, clearance=0.8)
+    upward = mesh.face_normals[:, 2]
+    for point, face, is_hidden in zip(points + 1e-3 * mesh.face_normals[faces], faces, mask, strict=True):
+        ceiling = min(hits(mesh, upward < -0.1, point, 1.0), default=np.inf)
+        expected = min(hits(mesh, upward > 0.1, point, 1.0), default=np.inf) < ceiling
+        if upward[face] > 0.1:
+            expected |= ceiling < 0.8
+        else:
+            gap = min(hits(mesh, upward > 0.1, point, -1.0), default=np.inf)
+            expected |= np.isinf(gap) or (upward[face] < -0.1 and gap < 0.8)
+        assert is_hidden == expected
+    assert 0.2 < mask.mean() < 0.9
