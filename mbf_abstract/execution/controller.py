@@ -295,11 +295,13 @@ class ControllerExecution:
         return self._count_failure(result, lease)
 
     def _count_failure(self, result: ControlResult, lease: Lease) -> ControllerEnd | None:
-        """Stop after a failed cycle; the end, once there were too many or the patience is over."""
+        """Stop after a failed cycle; the end, once there were too many, the patience is over, or asking again is vain."""
         parameters = self._runtime.parameters
         self._failures += 1
         command = None if parameters.force_stop_on_retry else result.command
         self._write_to_robot(lease.stop if command is None else partial(lease.send, command))
+        if result.outcome == ExePathOutcome.MISSED_GOAL:  # a robot that stands does not get back before its goal
+            return self._end(ControllerState.MISSED_GOAL, result.outcome, result.message)
         if self._failures > parameters.controller_max_retries >= 0:
             text = result.message or f"{self._failures} failed cycle(s) in a row"
             return self._end(ControllerState.MAX_RETRIES, result.outcome, text)

@@ -87,6 +87,15 @@ def test_a_robot_that_slides_away_from_its_goal_each_time_has_missed_it(make_ses
     assert session.robot.command.is_stopped()
 
 
+def test_a_controller_that_has_missed_the_goal_is_not_asked_again(make_session, states):
+    session = make_session(controller_max_retries=-1, controller_patience=5.0)
+    session.controller.play(drive(), ControlResult(Outcome.MISSED_GOAL, "past it"), drive())
+    result = session.navigator.exe_path(session.path_to(5.0))
+    assert (result.outcome, result.message) == (Outcome.MISSED_GOAL, "past it")
+    assert states(session, "controller_execution")[-1] == "missed_goal"
+    assert (len(session.controller.requests), session.robot.command.is_stopped()) == (2, True)
+
+
 def test_a_robot_that_gets_no_farther_in_stops_where_it_is(make_session, states):
     """It slid by 0.1 m and can come back to 0.27 m at most: within its tolerance, but not by as much as it slid."""
     session = make_session(force_stop_at_goal=True, mbf_tolerance_exclusive=True)
