@@ -295,7 +295,7 @@ class ControllerExecution:
         return self._count_failure(result, lease)
 
     def _count_failure(self, result: ControlResult, lease: Lease) -> ControllerEnd | None:
-        """Stop after a failed cycle; the end, once there were too many, the patience is over, or asking again is vain."""
+        """Stop after a failed cycle; the end, after too many, after the patience, or where asking again is vain."""
         parameters = self._runtime.parameters
         self._failures += 1
         command = None if parameters.force_stop_on_retry else result.command
