@@ -131,7 +131,10 @@ class MapWorld(BuildingWorld):
     type: Literal["map"]
     file: Path = parameter(..., "The map's yaml file.")
     corner: tuple[float, float] | None = parameter(
-        None, "Where the map's lower left corner is put in the world; not given = as in the file.", unit="m"
+        None,
+        "Where the lower left corner of the map, or of the upright box around a rotated one, is put in the world; "
+        "not given = as in the file.",
+        unit="m",
     )
 
     def grid(self) -> OccupancyGrid:
