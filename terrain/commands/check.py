@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import typer
+
 from mbf_abstract.commands.check import Checked
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.config.yaml_source import YamlDocument, read_yaml
@@ -44,6 +46,8 @@ def _check_scenario(document: YamlDocument, load: bool) -> Checked:
 
     report = check_scenario(document, load=load)
     if report.findings or report.scenario is None:
+        for note in report.notes:  # what was assumed of the robot may be the cause
+            typer.echo(f"note: {note}", err=True)
         raise ConfigError(report.findings)
     scenario = report.scenario
     views = robot_scenarios(scenario).values()

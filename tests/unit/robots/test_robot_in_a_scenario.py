@@ -267,6 +267,15 @@ def test_mbf_check_of_a_scenario_names_what_was_assumed_of_its_robot(scenario):
     assert "max_speed: 1 m/s is assumed" in shown.output
 
 
+def test_mbf_check_names_what_was_assumed_also_where_something_is_wrong(scenario, tmp_path):
+    file = scenario("my.urdf")
+    (tmp_path / "nav.yaml").write_text(NAVIGATION + "controller_frequency: 0\n")
+    shown = checked(file)
+    assert shown.exit_code == 2
+    assert "note: hand_made: max_speed: 1 m/s is assumed" in shown.output
+    assert "controller_frequency: expected a number > 0" in shown.output
+
+
 def test_mbf_check_names_controllers_that_a_car_cannot_do(scenario, tmp_path):
     file = scenario("{urdf: 'package://pybullet_data/racecar/racecar.urdf'}")
     (tmp_path / "nav.yaml").write_text(NAVIGATION.replace("regulated_pure_pursuit", "rotation_shim"))
