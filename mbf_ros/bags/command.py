@@ -23,6 +23,7 @@ def register(app: typer.Typer) -> None:
     bag = typer.Typer(help="Bags of ROS 1 and ROS 2, without ROS.", no_args_is_help=True)
     bag.command("replay", cls=CoordinateCommand)(replay)
     bag.command("map")(recorded_map)
+    bag.command("points")(points)
     bag.command("export")(export)
     app.add_typer(bag, name="bag")
 
@@ -101,6 +102,38 @@ def recorded_map(
             write_recorded_map(out, message)
     info = message["info"]
     typer.echo(f"{out}: {info['width']} x {info['height']} cells of {info['resolution']:.3g} m")
+
+
+def points(
+    bag: Path = typer.Argument(..., help="A .bag file of ROS 1; a folder, .mcap or .db3 file of ROS 2."),
+    out: Path = typer.Option(Path("points.ply"), "--out", help="The point cloud, a .ply file."),
+    frame: str = typer.Option("map", "--frame", help="Frame of the points, e.g. odom where there is no localisation."),
+    sensors: list[str] = typer.Option(
+        [], "--points", metavar="TOPIC", help="Topic of a sensor; all point clouds if not given, or else all scans."
+    ),
+    topic: list[str] = typer.Option([], "--topic", metavar="WHAT=TOPIC", help="Topic of tf, tf_static or odom."),
+    tf: list[str] = typer.Option(
+        [], "--tf", metavar="PARENT:CHILD=X,Y,Z,YAW", help="A transform that does not change and is not in the bag."
+    ),
+    odom_tf: bool = typer.Option(False, "--odom-tf", help="Take the poses of odometry for transforms."),
+    max_range: float = typer.Option(math.inf, "--max-range", min=0.0, help="Leave out points farther away [m]."),
+    every: int = typer.Option(1, "--every", min=1, help="Take every n-th scan of a topic."),
+) -> None:
+    """Write what the sensors hit, in one frame, as a point cloud for mbf map build."""
+    with readable_errors():
+        from mbf_ros.bags.reading import open_bag
+        from mbf_ros.bags.recorded_points import PointOptions, read_recorded_points, write_points
+        from mbf_ros.bags.replay_options import ReplayOptions
+
+        if out.suffix != ".ply":
+            raise typer.BadParameter(f"expected a .ply file, got {str(out)!r}", param_hint="--out")
+        chosen = PointOptions(frame.lstrip("/"), tuple(sensors), max_range, every)
+        with waiting("reading the bag"), open_bag(bag) as opened:
+            found = read_recorded_points(opened, chosen, ReplayOptions(_pairs(topic), _transforms(tf), odom_tf))
+            write_points(out, found.points, chosen.frame)
+    for reason, count in found.left_out.most_common():
+        typer.echo(f"note: {count} scans left out, {reason}", err=True)
+    typer.echo(f"{out}: {len(found.points)} points of {found.scans} scans; mbf map build {out} --out MAP.ply")
 
 
 def export(

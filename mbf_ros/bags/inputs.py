@@ -40,6 +40,13 @@ class RecordedRobot:
         return self.last
 
 
+def odometry_transform(message: Message, context: MessageContext, stamp: float, robot_frame: str) -> Transform:
+    """The pose of odometry as a transform; ``robot_frame`` is meant where it names no frame of the robot."""
+    body, parent = message["pose"]["pose"], context.frame(message["header"]["frame_id"])
+    child = message["child_frame_id"].lstrip("/") or robot_frame
+    return Transform(vector_of(body["position"]), quaternion_of(body["orientation"]), parent, child, stamp)
+
+
 class BagInputs:
     """Takes the messages of a bag, each at its time.
 
@@ -113,10 +120,8 @@ class BagInputs:
     def _take_odometry(self, statistics: TopicStatistics, message: Message, now: float) -> None:
         self._robot.last = odometry_of(message, self._context, now)
         if self._odometry_as_transform:
-            body, parent = message["pose"]["pose"], self._context.frame(message["header"]["frame_id"])
-            child = message["child_frame_id"].lstrip("/") or self._server.runtime.robot.robot_frame
-            place = vector_of(body["position"]), quaternion_of(body["orientation"])
-            self._set(statistics, Transform(*place, parent, child, self._robot.last.stamp), now)
+            robot_frame, stamp = self._server.runtime.robot.robot_frame, self._robot.last.stamp
+            self._set(statistics, odometry_transform(message, self._context, stamp, robot_frame), now)
         else:
             statistics.delays.take(now - self._robot.last.stamp)
 

@@ -23,11 +23,11 @@ from mbf_abstract.session import NavigationSession
 from mbf_ros.bags.inputs import BagInputs, RecordedRobot
 from mbf_ros.bags.observation import Observation
 from mbf_ros.bags.planning import ReplayedPlan
-from mbf_ros.bags.reading import Bag, BagError
+from mbf_ros.bags.reading import Bag
 from mbf_ros.bags.recorded_time import RecordedTime, steady_messages
 from mbf_ros.bags.replay_options import ReplayOptions
 from mbf_ros.bags.statistics import FrameStatistics, TopicStatistics
-from mbf_ros.bags.topics import BagTopics, choose_topics
+from mbf_ros.bags.topics import check_transforms, choose_topics
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.robot_inputs import RobotInputs
 
@@ -89,7 +89,7 @@ def replay_bag(
             transforms.set(transform)
         maps = RobotInputs(session.clock.now, lambda: MessageContext(config.parameters.global_frame)).of_maps(server)
         topics = choose_topics(bag.types, options.topics, *_sources(server), maps)
-        _check_transforms(bag, topics, options)
+        check_transforms(bag, topics, options.transforms, options.odometry_as_transform)
         time = RecordedTime(bag, topics, config.parameters.global_frame)
         inputs = BagInputs(bag, topics, time, server, robot, options.odometry_as_transform)
         observation = Observation(server, robot, options.map_name, time.began, time.duration)
@@ -179,18 +179,6 @@ def _sources(server: MapServer) -> tuple[list[str], bool]:
     maps = [served.map for served in server.served.values()]
     named = sorted({name for one in maps for name in one.source_names})
     return named, any(one.listens_to("") for one in maps)
-
-
-def _check_transforms(bag: Bag, topics: BagTopics, options: ReplayOptions) -> None:
-    """Raise BagError where nothing says where the robot is."""
-    odometry = options.odometry_as_transform
-    if odometry and not topics.odometry:
-        raise BagError(f"{bag.path}: --odom-tf: expected odometry (nav_msgs/Odometry), got none")
-    if not (topics.transforms or topics.static or options.transforms or odometry):
-        raise BagError(
-            f"{bag.path}: expected transforms (tf2_msgs/TFMessage), got none; --odom-tf takes the poses of odometry, "
-            "--tf PARENT:CHILD=X,Y,Z,YAW gives one that does not change"
-        )
 
 
 def _replayed(

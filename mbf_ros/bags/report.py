@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -9,6 +10,7 @@ from mbf_abstract.drive_log import LogReport, LogTable
 from mbf_ros.bags.replay import Replayed
 
 TOPIC_HEADER = ("topic", "type", "used as", "messages", "Hz", "largest gap [s]", "mean delay [s]", "largest delay [s]")
+ROUNDING = 0.006  # m, of a length with two digits
 FRAME_HEADER = ("frame", "parent", "transforms", "Hz", "largest gap [s]", "largest delay [s]")
 
 
@@ -47,8 +49,9 @@ def result_line(replayed: Replayed) -> str:
     if replayed.plan is None:
         return line
     plan = replayed.plan
-    length = "" if plan["length_m"] is None else f"{plan['length_m']:.2f} m"
-    shown = f", {length}" if length not in plan["message"] else ""  # some planners' messages name it
+    length, named = plan["length_m"], re.findall(r"(\d+\.\d\d) m\b", plan["message"])  # some planners name it
+    is_named = length is None or any(abs(float(one) - length) <= ROUNDING for one in named)
+    shown = "" if is_named else f", {length:.2f} m"
     return f"{line}; plan at {plan['at_s']:.1f} s: {plan['outcome_name']}{shown}: {plan['message']}"
 
 

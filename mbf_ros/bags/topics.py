@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from mbf_ros.bags.reading import KNOWN_AS, BagError
+from mbf_abstract.geometry.transform import Transform
+from mbf_ros.bags.reading import KNOWN_AS, Bag, BagError
 from mbf_ros.messages.interfaces import full_name
 from mbf_ros.messages.sensors import SENSORS
 from mbf_ros.robot_inputs import Input
@@ -91,6 +92,17 @@ def choose_topics(
     floors = {f"/{one.topic.lstrip('/')}": one for one in maps}
     there = {topic: one for topic, one in floors.items() if types.get(topic) == full_name(one.type)}
     return BagTopics(roles[TRANSFORMS], roles[STATIC], roles[ODOMETRY], sensors, there)
+
+
+def check_transforms(bag: Bag, topics: BagTopics, given: Sequence[Transform], odometry: bool) -> None:
+    """Raise BagError where nothing says where the robot is: no topic, no ``given`` transform, and no ``odometry``."""
+    if odometry and not topics.odometry:
+        raise BagError(f"{bag.path}: --odom-tf: expected odometry (nav_msgs/Odometry), got none")
+    if not (topics.transforms or topics.static or given or odometry):
+        raise BagError(
+            f"{bag.path}: expected transforms (tf2_msgs/TFMessage), got none; --odom-tf takes the poses of odometry, "
+            "--tf PARENT:CHILD=X,Y,Z,YAW gives one that does not change"
+        )
 
 
 def _of_role(role: str, types: Mapping[str, str]) -> list[str]:
