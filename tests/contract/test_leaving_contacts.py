@@ -123,6 +123,31 @@ def test_no_way_is_taken_where_the_path_leads_farther_in_or_along_what_is_touche
     assert (chosen is not None) == leads
 
 
+class BetweenTwo:
+    """A gap between two things: 1 cm ahead and 1 cm behind its middle the outline touches one of them by 5 mm."""
+
+    def contact_depth(self, pose):
+        return 0.005 if 0.01 <= abs(pose.x) <= 0.02 else 0.0
+
+    def obstacle_on_path(self, pose, command, duration):
+        """What is touched keeps the robot from driving on towards it."""
+        deeper = self.contact_depth(pose) > 0.0 and command.vx * math.cos(pose.yaw) * pose.x > 0.0
+        return "deeper" if deeper else ""
+
+
+def test_a_robot_between_two_things_does_not_drive_to_and_fro():
+    """From each the straight way out is back, to the other one; it did so until it counted as stuck."""
+    way, pose, speeds = WayOut(), Pose.planar(0.012, 0.0), []
+    turn = lambda angle: Twist.planar(wz=math.copysign(1.0, angle))  # noqa: E731
+    for _ in range(40):
+        command = way.command(BetweenTwo(), pose, 0.0, turn, Gears(reverses=True), leads_out)
+        if command is None or command.wz != 0.0:
+            return
+        speeds.append(command.vx)
+        pose = moved(pose, command)
+    assert np.count_nonzero(np.diff(np.sign(speeds))) <= 1, "it drives to and fro"
+
+
 def test_a_way_is_kept_until_the_robot_is_clear(world):
     navigation_map, way, pose = world.inflated(pillar), WayOut(), Pose.planar(2.83, 2.52, math.pi)
     driven = 0.0

@@ -110,6 +110,8 @@ class WayOut:
             if last is None:
                 returns = self._began is not None and pose.distance_to(self._began) <= SAME_PLACE
                 self._began, self._turns_first = pose, returns and not self._turns_first
+            elif not _elsewhere(pose, last):  # it has come upon something else: back it would come upon the first
+                self._turns_first = True
             gears = self._gears(gears)
             leads = path_leads(navigation_map, depth, on_path(max(WITHIN, DEPTHS * depth))) if depth > 0.0 else INTO
             chosen = None
