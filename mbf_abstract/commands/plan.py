@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from contextlib import ExitStack
-from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,8 +16,7 @@ from mbf_abstract.commands.waiting import waiting
 
 if TYPE_CHECKING:
     from mbf_abstract.geometry import Pose
-    from mbf_abstract.goals.goal_types import GetPathGoal
-    from mbf_abstract.goals.result_types import GetPathResult, RefinePathResult
+    from mbf_abstract.goals.result_types import GetPathResult
     from mbf_abstract.server.navigation_server import AbstractNavigationServer
 
 
@@ -57,7 +55,7 @@ def plan(
         from mbf_abstract.commands.plan_picture import draw_plan
         from mbf_abstract.compiling.compilation import record_compilations
         from mbf_abstract.goals.goal_types import GetPathGoal
-        from mbf_abstract.server.standing_server import place_robot, read_config_or_map, standing_server
+        from mbf_abstract.server.standing_server import place_robot, planned, read_config_or_map, standing_server
         from mbf_abstract.time.clock import wall_seconds
 
         cls, checked, notes = read_config_or_map(config, "" if unknown is None else unknown.value)
@@ -71,8 +69,9 @@ def plan(
             began = wall_seconds()
             with waiting("planning") as say, record_compilations(lambda name: say(f"compiling {name}")) as compiled:
                 goal_to_plan = GetPathGoal(goal_pose, planner=planner, dist_tolerance=tolerance)
-                result = _planned(server, goal_to_plan, notes)
+                result, refining = planned(server, goal_to_plan)
             seconds = wall_seconds() - began - compiled.seconds
+            notes += [refining] if refining else []
             if png is not None:
                 with waiting("drawing the picture"):
                     draw_plan(png, server, start_pose, goal_pose, result)
@@ -83,22 +82,6 @@ def plan(
     _report(result, seconds, notes, as_json)
     if not result.success:
         raise typer.Exit(FAILURE)
-
-
-def _planned(server: AbstractNavigationServer, goal: GetPathGoal, notes: list[str]) -> GetPathResult:
-    """Plan, and send the plan through the configuration's ``plan_refiner``; a note says where that fails."""
-    from mbf_abstract.goals.goal_types import RefinePathGoal
-    from mbf_abstract.navigator import Navigator
-
-    navigator = Navigator(server)
-    plan: GetPathResult = navigator.send(goal).wait()
-    refiner = server.config.parameters.plan_refiner
-    if plan.path is None or not plan.success or not refiner:
-        return plan
-    refined: RefinePathResult = navigator.send(RefinePathGoal(plan.path, refiner)).wait()
-    if not refined.success:
-        notes.append(f"{refiner} did not refine the path: {refined.outcome_name}: {refined.message}")
-    return replace(plan, path=refined.refined_path)
 
 
 def _pose(name: str, place: Place, server: AbstractNavigationServer, notes: list[str]) -> Pose:

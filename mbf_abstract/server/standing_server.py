@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,10 @@ from mbf_abstract.config.yaml_source import read_yaml
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.goals.goal_types import GetPathGoal, RefinePathGoal
+from mbf_abstract.goals.result_types import GetPathResult, RefinePathResult
 from mbf_abstract.maps.view import UNKNOWN_OCCUPANCY, FloorMap
+from mbf_abstract.navigator import Navigator
 from mbf_abstract.server.factory import installed_servers, read_config
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.session import NavigationSession
@@ -121,3 +125,18 @@ def read_config_text(text: str) -> tuple[type[AbstractNavigationServer], Config]
         file = Path(folder) / "default_configuration.yaml"
         file.write_text(text, encoding="utf-8")
         return read_config(file)
+
+
+def planned(server: AbstractNavigationServer, goal: GetPathGoal) -> tuple[GetPathResult, str]:
+    """Plan, and send the plan through the configuration's ``plan_refiner``; the text says why that failed.
+
+    The cost stays that of the plan before.
+    """
+    navigator, refiner = Navigator(server), server.config.parameters.plan_refiner
+    plan: GetPathResult = navigator.send(goal).wait()
+    if plan.path is None or not plan.success or not refiner:
+        return plan, ""
+    refined: RefinePathResult = navigator.send(RefinePathGoal(plan.path, refiner)).wait()
+    problem = "" if refined.success else f"{refiner} did not refine the path: {refined.outcome_name}: {refined.message}"
+    message = f"{plan.message}; refined by {refiner}, the cost is that before" if refined.success else plan.message
+    return replace(plan, path=refined.refined_path, message=message), problem

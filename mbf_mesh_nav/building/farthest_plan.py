@@ -12,8 +12,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal
-from mbf_abstract.navigator import Navigator
-from mbf_abstract.server.standing_server import place_robot, read_config_or_map, standing_server
+from mbf_abstract.server.standing_server import place_robot, planned, read_config_or_map, standing_server
 from mbf_mesh_nav.arrays import BoolArray, FloatArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.places import FORBIDDEN_COST
@@ -57,7 +56,7 @@ def plan_farthest(map_file: Path) -> FarthestPlan:
         frame = config.parameters.global_frame
         start, goal = (Pose.planar(x, y, 0.0, z, frame_id=frame) for x, y, z in mesh_map.vertices[list(ends)].tolist())
         place_robot(server, start)
-        result = Navigator(server).send(GetPathGoal(goal)).wait()
+        result, _ = planned(server, GetPathGoal(goal))
     path = NO_PATH if result.path is None else np.asarray(result.path.positions, dtype=np.float64)
     length = "" if result.path is None else f", {result.path.length:.1f} m"
     text = f"{result.planner}: {result.outcome_name}{length} ({result.message})"

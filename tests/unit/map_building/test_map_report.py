@@ -124,6 +124,18 @@ def test_the_test_plan_is_between_vertices_that_are_nearly_the_farthest():
     assert 0.9 * longest < lengths[first][second] <= longest + 1e-9
 
 
+def test_the_test_plan_is_that_of_mbf_plan_and_does_not_zigzag(tmp_path):
+    out = tmp_path / "flat.ply"
+    build_map([write_text(tmp_path / "flat.xyz", ground(np.random.default_rng(3), flat))], out)
+    plan = plan_farthest(out)
+    straight = np.linalg.norm(np.subtract(plan.goal, plan.start))
+    assert plan.success and "refined by string_pulling" in plan.text
+    assert np.linalg.norm(np.diff(plan.path, axis=0), axis=1).sum() < 1.01 * straight
+    start, goal = ([f"{number:.6f}" for number in place] for place in (plan.start, plan.goal))
+    done = CliRunner().invoke(make_app(), ["plan", str(out), "--start", *start, "--goal", *goal])
+    assert "refined by string_pulling, the cost is that before" in done.stdout
+
+
 def test_where_nothing_is_free_the_report_says_so(tmp_path):
     rng = np.random.default_rng(3)
     points = ground(rng, lambda x, y: 2.0 * x, size=(8.0, 8.0))  # 63 degrees
