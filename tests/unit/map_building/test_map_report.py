@@ -130,7 +130,7 @@ def test_the_test_plan_is_that_of_mbf_plan_and_does_not_zigzag(tmp_path):
     plan = plan_farthest(out)
     straight = np.linalg.norm(np.subtract(plan.goal, plan.start))
     assert plan.success and "refined by string_pulling" in plan.text
-    assert np.linalg.norm(np.diff(plan.path, axis=0), axis=1).sum() < 1.01 * straight
+    assert np.linalg.norm(np.diff(plan.path, axis=0), axis=1).sum() < 1.03 * straight  # along the edges it is 1.05
     start, goal = ([f"{number:.6f}" for number in place] for place in (plan.start, plan.goal))
     done = CliRunner().invoke(make_app(), ["plan", str(out), "--start", *start, "--goal", *goal])
     assert "refined by string_pulling, the cost is that before" in done.stdout
