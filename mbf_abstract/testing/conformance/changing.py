@@ -98,7 +98,7 @@ def a_bad_change_is_named(site: Site) -> None:
             lambda: server.set_layer_parameters(places[0], enabled="perhaps"),
             (f"{places[0]}.enabled: expected true or false, got 'perhaps'",),
         ),
-        ("a radius below 0", lambda: radius(-1.0), ("radius: expected a number >", " 0 m, got -1.0")),
+        ("a radius below 0", lambda: radius(-1.0), ("radius: expected a number >", " 0", " m, got -1.0")),
         ("a radius of NaN", lambda: radius(float("nan")), ("radius: expected a finite number", " m, got nan")),
         ("a flag for a radius", lambda: radius(True), ("footprint: expected ", "radius in m", "got True")),
         ("a text for corners", lambda: radius("round"), ("footprint: expected ", "got 'round'")),
