@@ -6,7 +6,8 @@ Rule of mesh_navigation: ``lethal_value`` at the lethal vertices, ``inscribed_va
 ``inscribed_value * exp(-cost_scaling_factor (d - inscribed_radius))`` up to the inflation radius, 0 beyond. Deviations:
 isolated lethal vertices are inflated too, with ``source_cost`` also vertices that are not lethal, and a change of the
 input repairs the distances instead of starting over, and ``inscribed_value`` is 1 by default instead of 0.99: planners
-would pass where the robot touches. The repulsive vectors are not offered; our planners do not steer
+would pass where the robot touches. Beyond the inscribed radius costs are always less than that, also where the fall-off
+is 0. The repulsive vectors are not offered; our planners do not steer
 by them.
 Cost: linear in the vertices within the radius; an update in the vertices whose distance changes.
 """
@@ -36,7 +37,9 @@ class InflationParameters(LayerParameters, InflationRadii):
     inscribed_value: float = parameter(
         1.0, "Cost up to the inscribed radius; below the cost_limit of planners they pass there.", ge=0.0
     )
-    cost_scaling_factor: float = parameter(1.0, "Rate of the exponential fall-off.", unit="1/m", ge=0.0)
+    cost_scaling_factor: float = parameter(
+        1.0, "Rate of the exponential fall-off; with 0 ground within the radius is dear, but free.", unit="1/m", ge=0.0
+    )
     source_cost: float = parameter(
         math.inf,
         "Vertices of the input whose cost reaches this are inflated like lethal ones, without becoming lethal.",

@@ -120,8 +120,12 @@ def read_recorded_points(
 
 
 def write_points(file: Path, points: FloatArray, frame: str) -> None:
-    """Write points (n, 3) [m] as a binary PLY; a file of that name is replaced when the new one is complete."""
-    header = HEADER.format(frame=frame, count=len(points)).encode("ascii", "replace")
+    """Write points (n, 3) [m] as a binary PLY; a file of that name is replaced when the new one is complete.
+
+    The header is lines of ASCII: other characters of the frame's name are written as Python escapes them.
+    """
+    name = frame.encode("unicode_escape").decode("ascii")
+    header = HEADER.format(frame=name, count=len(points)).encode("ascii")
     write_whole(file, header + points.astype("<f8").tobytes())
 
 

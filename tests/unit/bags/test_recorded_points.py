@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 from mbf_abstract.cli import make_app
 from mbf_mesh_nav.building.clouds.point_cloud import read_clouds
 from mbf_ros.bags.reading import open_bag
-from mbf_ros.bags.recorded_points import PointOptions, read_recorded_points
+from mbf_ros.bags.recorded_points import PointOptions, read_recorded_points, write_points
 from mbf_ros.bags.replay_options import ReplayOptions
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.sensors import point_cloud
@@ -95,3 +95,11 @@ def test_odometry_may_stand_for_transforms(tmp_path):
     assert found.scans == 21
     np.testing.assert_allclose(found.points[:, 0], WALL, atol=1e-6)
     assert run(bag, "--out", tmp_path / "points.ply").exit_code == 2
+
+
+@pytest.mark.parametrize("frame", ["map\nelement vertex 7", "карта", "\udcff", "\\n", "robot 1/map"])
+def test_no_name_of_a_frame_ruins_the_header(tmp_path, frame):
+    write_points(tmp_path / "points.ply", FLOOR, frame)
+    np.testing.assert_array_equal(read_clouds([tmp_path / "points.ply"]).points, FLOOR)
+    named = (tmp_path / "points.ply").read_bytes().splitlines()[2].removeprefix(b"comment points of a bag in the frame ")
+    assert named.decode("unicode_escape") == frame

@@ -92,6 +92,20 @@ def test_costs_are_flat_up_to_the_inscribed_radius_then_fade_and_end_at_the_infl
     assert {0.0, 1.0} < set(layer.costs.tolist()) and (layer.costs == np.float32(0.9)).sum() > 3
 
 
+@pytest.mark.parametrize("cost_scaling_factor", [0.0, 1e-9])
+def test_costs_that_hardly_fade_forbid_nothing_beyond_the_inscribed_radius(cost_scaling_factor):
+    mesh = bumpy(0)
+    lethal = np.arange(len(mesh.vertices)) == 20
+    radii = {"inscribed_radius": 0.3, "inflation_radius": 0.7}
+    _, layer = chain(mesh, lethal, **radii, cost_scaling_factor=cost_scaling_factor)
+
+    near, far = layer.distances <= np.float32(0.3), layer.distances > 0.7
+    assert 3 < near.sum() < (~far).sum() and (layer.costs[near] == 1.0).all() and (layer.costs[far] == 0.0).all()
+    beyond = layer.costs[~near & ~far]
+    assert (beyond < 1.0).all()
+    np.testing.assert_allclose(beyond, 1.0, rtol=1e-6)
+
+
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10_000), st.floats(0.2, 1.5))
 def test_distances_equal_those_of_a_heap(seed, radius):
