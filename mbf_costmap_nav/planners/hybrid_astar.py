@@ -30,11 +30,12 @@ from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP
 from mbf_costmap_nav.kernels.map.path_poses import yaw_quaternions
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND
-from mbf_costmap_nav.planning.car_search import CarLeg, Driving, search_drive
+from mbf_costmap_nav.planning.car_search import TOO_WIDE, CarLeg, Driving, search_drive
 from mbf_costmap_nav.planning.car_world import CarWorkspace, CarWorld
 from mbf_costmap_nav.planning.grid_planning import check_tolerance, marked_if_permanent, off_map
 from mbf_costmap_nav.planning.path_assembly import heights_along
-from mbf_costmap_nav.planning.permanent_walls import is_in_walls, touches_walls
+from mbf_costmap_nav.planning.permanent_walls import is_in_walls, is_permanently_too_narrow, touches_walls
+from mbf_costmap_nav.planning.widest_disc import widest_disc
 from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
 
 FloatArray = NDArray[np.float64]
@@ -106,7 +107,7 @@ class HybridAStarPlanner(CostmapPlanner):
             if request.cancel_token.cancelled:
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if leg is None or len(leg.poses) == 0:
-                failure = failure or not_even_beside(self._no_path(world, start, goal, leg, name), tolerance)
+                failure = failure or not_even_beside(self._no_path(world, start, goal, leg, name, tolerance), tolerance)
                 failure = self._marked_at_border(failure, world, goal, tolerance)
                 return (
                     failure if failure.permanent else marked_if_permanent(failure, self.costmap, start, goal, tolerance)
@@ -144,7 +145,7 @@ class HybridAStarPlanner(CostmapPlanner):
         few = replace(self._driving(), max_states=min(ROOMY_STATES, self.parameters.max_states))
         for driving, ground in ((few, world.ground(roomy=True)), (self._driving(), None)):
             leg = search_drive(world, driving, start, goal, wanted=wanted, tolerance=tolerance, ground=ground)
-            if leg.status in (FOUND, CANCELED):
+            if leg.status in (FOUND, CANCELED, TOO_WIDE):
                 break
         return leg
 
@@ -160,14 +161,22 @@ class HybridAStarPlanner(CostmapPlanner):
             max_states=p.max_states,
         )
 
-    def _no_path(self, world: CarWorld, start: Pose, goal: Pose, leg: CarLeg | None, name: str) -> PlanResult:
-        """Failure with its cause: the goal is walled off, the car cannot get there, or the search gave up."""
+    def _no_path(
+        self, world: CarWorld, start: Pose, goal: Pose, leg: CarLeg | None, name: str, tolerance: float
+    ) -> PlanResult:
+        """Failure with its cause: walled off, too narrow, not to be driven by the car, or the search gave up."""
         ends = f"from ({start.x:.2f}, {start.y:.2f}) to the {name} ({goal.x:.2f}, {goal.y:.2f})"
         if leg is None and not world.fits(goal):
             text = f"the robot does not fit at the goal ({goal.x:.2f}, {goal.y:.2f}, {goal.yaw:.2f} rad)"
             return PlanResult(GetPathOutcome.BLOCKED_GOAL, text + self._closed_by(goal))
         if leg is None:
             return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no path {ends}, not even for a point robot")
+        if leg.status == TOO_WIDE:
+            width = 2.0 * widest_disc(world.footprint)[2]
+            text = f"no path {ends}: no way there is as wide as the robot, {width:.2f} m"
+            is_permanent = is_permanently_too_narrow(self.costmap, start, goal, tolerance)
+            text += " between the walls of the static map" if is_permanent else ""
+            return PlanResult(GetPathOutcome.NO_PATH_FOUND, text, permanent=is_permanent)
         if leg.status == GAVE_UP:
             text = f"no path {ends} within {leg.states} states; there may be one, see max_states"
             return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)

@@ -3,7 +3,8 @@
 When to use: by ``costmap.hybrid_astar``, and by ``manoeuvres`` for pieces of other planners' paths. When not: robots
 that fit everywhere at every heading; a search over cells is 10 to 100 times faster.
 
-Bins of two cells come first, for an eighth of the states; then finer ones, for tight places.
+Bins of two cells come first, for an eighth of the states; then finer ones, for tight places. After a long search that
+finds nothing it is looked whether any way to the goal is as wide as the robot.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from mbf_costmap_nav.kernels.car.motion_primitives import Car
 from mbf_costmap_nav.kernels.car.shorter_drive import shortened
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND
 from mbf_costmap_nav.planning.car_world import CarWorld
+from mbf_costmap_nav.planning.widest_disc import disc_gets_there
 
 FloatArray = NDArray[np.float64]
 
@@ -29,6 +31,8 @@ CELLS_OF_BINS = (2.0, 1.0, 0.5, 0.25)
 """Sides [cells] of the bins, in the order in which they are tried."""
 STATES_THAT_SHOW = 20_000
 """After so many states in bins of a cell or less finer ones are not tried: there is no path."""
+TOO_WIDE = 5
+"""Further state of a finished search: no way to the goal is as wide as the robot; a state near by may be reached."""
 
 
 @dataclass(frozen=True)
@@ -76,9 +80,9 @@ class Driving:
 
 @dataclass(frozen=True)
 class CarLeg:
-    """Result of a search between two poses: ``status`` of the kernel, and poses (n, 3); without them there is no path.
+    """Result of a search between two poses: ``status`` of the kernel or TOO_WIDE, and poses (n, 3).
 
-    The cost [m] is weighted; ``states`` were made.
+    Without poses there is no path. The cost [m] is weighted; ``states`` were made.
     """
 
     status: int
@@ -118,7 +122,11 @@ def search_drive(
         car = driving.car(world.costmap.resolution, cells)
         status, poses, cost, made = world.drive(ground, car, start, goal, wanted, tolerance, driving.max_states)
         states += made
-        if status in (FOUND, GAVE_UP, CANCELED):
+        if status not in (FOUND, CANCELED) and made > STATES_THAT_SHOW:
+            around = 0.0 if len(poses) else tolerance
+            if not disc_gets_there(world.costmap, world.footprint, start, wanted, around):
+                status = TOO_WIDE
+        if status in (FOUND, GAVE_UP, CANCELED, TOO_WIDE):
             break
     if status == FOUND:
         poses, cost = shortened(ground, car, poses, world.grid.token.flag)

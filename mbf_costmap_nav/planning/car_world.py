@@ -63,6 +63,7 @@ class CarWorld:
 
     Attributes
     ----------
+    footprint : Footprint
     samples, larger, slightly_larger : (n, 2) float64
         Of the footprint [m], and of it with ``SPARE`` around it.
     unknown : int
@@ -72,6 +73,7 @@ class CarWorld:
     """
 
     grid: SearchGrid
+    footprint: Footprint
     samples: FloatArray
     larger: FloatArray
     slightly_larger: FloatArray
@@ -96,7 +98,7 @@ class CarWorld:
         samples, larger, slightly_larger = (FootprintCheck(one, costmap.resolution).samples for one in outlines)
         unknown = UNKNOWN_AS if allow_unknown else LETHAL
         grid = SearchGrid.build(costmap, rules, token, workspace.from_start)
-        return cls(grid, samples, larger, slightly_larger, unknown, workspace)
+        return cls(grid, footprint, samples, larger, slightly_larger, unknown, workspace)
 
     @property
     def costmap(self) -> Costmap:

@@ -15,6 +15,7 @@ from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN, Costmap
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.planning.widest_disc import disc_gets_there, in_reach
 
 EIGHT_NEIGHBOURS = np.ones((3, 3), dtype=bool)
 
@@ -52,14 +53,16 @@ def is_permanently_unreachable(
     ix, iy = walls.world_to_cell_clamped(start.x, start.y)
     if threshold <= walls.cells[iy, ix] != UNKNOWN:
         return False
-    pieces = _pieces(walls, threshold)
-    goal_x, goal_y = walls.world_to_cell_clamped(goal.x, goal.y)
     reach = tolerance / walls.resolution + 1.0 if tolerance > 0.0 else 0.0
-    near = int(min(reach, max(pieces.shape)))  # the tolerance may be inf
-    left, below = max(goal_x - near, 0), max(goal_y - near, 0)
-    around = pieces[below : goal_y + near + 1, left : goal_x + near + 1]
-    rows, columns = np.nonzero(around == pieces[iy, ix])
-    return bool(((columns + left - goal_x) ** 2 + (rows + below - goal_y) ** 2 > reach * reach).all())
+    return not in_reach(_pieces(walls, threshold), (ix, iy), walls.world_to_cell_clamped(goal.x, goal.y), reach)
+
+
+def is_permanently_too_narrow(costmap: LayeredCostmap, start: Pose, goal: Pose, tolerance: float) -> bool:
+    """Whether permanent walls leave no way that is wide enough for the robot to within ``tolerance`` [m] of a goal."""
+    walls = costmap.permanent_costmap()
+    if walls is None or not (walls.contains(start.x, start.y) and walls.contains(goal.x, goal.y)):
+        return False
+    return not disc_gets_there(walls, costmap.footprint, start, goal, tolerance)
 
 
 def _pieces(walls: Costmap, threshold: int) -> NDArray[np.unsignedinteger]:

@@ -227,9 +227,10 @@ def test_giving_up_differs_from_having_tried_everything(make_plugin):
     cells[48, 57] = 0  # a hole that only a point gets through
     tired = plan(make_plugin(HybridAStarPlanner, cells, resolution=0.1, max_states=500), (1, 5, 0), (4.9, 4.9, 0))
     assert tired.outcome == GetPathOutcome.NO_PATH_FOUND and "see max_states" in tired.message
-    small = np.full((30, 30), 254, dtype=np.uint8)
-    small[2:9, 2:28] = small[12:28, 2:28] = small[9:12, 14] = 0
-    done = plan(make_plugin(HybridAStarPlanner, small, resolution=0.1), (0.6, 0.55, 0), (1.0, 2.0, 0))
+    corridor = np.full((12, 120), 254, dtype=np.uint8)
+    corridor[2:10, 2:118] = 0
+    forward = make_plugin(HybridAStarPlanner, corridor, resolution=0.1, min_turning_radius=2.0, allow_reversing=False)
+    done = plan(forward, (6.0, 0.6, 0.0), (4.0, 0.6, 0.0))
     assert done.outcome == GetPathOutcome.NO_PATH_FOUND and "states were tried" in done.message
 
 
