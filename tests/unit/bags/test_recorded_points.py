@@ -101,5 +101,6 @@ def test_odometry_may_stand_for_transforms(tmp_path):
 def test_no_name_of_a_frame_ruins_the_header(tmp_path, frame):
     write_points(tmp_path / "points.ply", FLOOR, frame)
     np.testing.assert_array_equal(read_clouds([tmp_path / "points.ply"]).points, FLOOR)
-    named = (tmp_path / "points.ply").read_bytes().splitlines()[2].removeprefix(b"comment points of a bag in the frame ")
+    comment = (tmp_path / "points.ply").read_bytes().splitlines()[2]
+    named = comment.removeprefix(b"comment points of a bag in the frame ")
     assert named.decode("unicode_escape") == frame
