@@ -26,7 +26,7 @@ from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery
 from mbf_abstract.executives.map_leaves import CheckPose, PathBlocked
 from mbf_abstract.executives.pacing import Delay, InBackground
 from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
-from mbf_abstract.executives.trees.by_motion import EndDrive, PickByMotion
+from mbf_abstract.executives.trees.by_motion import MEETING, EndDrive, PickByMotion
 from mbf_abstract.executives.trees.options import TreeOptions
 from mbf_abstract.executives.watchdogs import MotorWatchdog, OscillationWatchdog, ProgressWatchdog
 from mbf_abstract.maps.tracking.objects import Motion
@@ -40,8 +40,6 @@ LOOK_PERIOD = 0.7
 """Time [s] between two looks at the path of a tree that asks who is on it."""
 STANDING = 1.5
 """Who has been seen to stand for less than this [s] may be about to move."""
-MEETING = 6.0
-"""Who came along the path and has stood for so long [s] before a robot that creeps does not go on before that one."""
 CREEPING = 0.2
 """A robot slower than this [m/s] before somebody who stands is taken to be waited for."""
 

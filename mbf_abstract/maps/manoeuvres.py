@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -111,6 +111,13 @@ def find_manoeuvre(
             count += 1  # of states that promise the same the older one is looked at first
             heapq.heappush(queue, (cost + left(end), count, _State(cost, end, step, state)))
     return None
+
+
+def driven_back(steps: Sequence[Step]) -> list[Step]:
+    """The same manoeuvre from its end to the origin, in the other gears."""
+    begins = [(0.0, 0.0, 0.0), *(step.poses[-1] for step in steps)]
+    back = zip(steps, begins, strict=False)
+    return [Step(-step.gear, (*step.poses[-2::-1], begin), step.cost) for step, begin in back][::-1]
 
 
 def radius_beyond(most: float) -> float:

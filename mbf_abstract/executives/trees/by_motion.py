@@ -21,6 +21,8 @@ MARGIN = 0.2
 """Who is this near [m] to the robot's outline on its path may keep its controller from following that."""
 LONGEST_PASSING = 3.0
 """So far [m] from where a detour was taken the robot still passes who stands there."""
+MEETING = 6.0
+"""Who was seen to move and has stood for so long [s] before a robot that creeps does not go on before that one."""
 ALONG = 0.7
 """From this cosine on between the path and its way somebody goes along the path."""
 
@@ -35,7 +37,8 @@ class PickByMotion(Composite):
     nobody : Behaviour
         Where no tracked object is in the way.
     came : Behaviour, optional
-        For one that waits and was seen to come along the path before it stood. None = as ``by_motion`` has it.
+        For one that waits for the robot: it was seen to come along the path before it stood, or to move at all, and
+        has stood for ``MEETING``. None = as ``by_motion`` has it.
     length : float
         How far ahead along the path [m] counts.
     standing : float
@@ -73,7 +76,7 @@ class PickByMotion(Composite):
             return
         motion = first.by.motion if first.by.standing >= self.standing else Motion.MOVING
         self._picked = self.by_motion.get(motion)
-        if motion is Motion.WAITING and first.along <= -ALONG:
+        if motion is Motion.WAITING and waits_for_robot(first):
             self._picked = self.came or self._picked
         self.feedback_message = f"{motion.value}, {first.distance:.1f} m ahead"
 
@@ -92,16 +95,22 @@ def blockages_ahead(mission: MissionContext, margin: float) -> list[Blockage]:
     return []
 
 
+def waits_for_robot(first: Blockage) -> bool:
+    """Whether one that stands on the path came along it, or was seen to move and stands for longer than to load."""
+    moved = first.by.course != (0.0, 0.0)
+    return first.along <= -ALONG or (moved and first.by.standing >= MEETING)
+
+
 def first_in_the_way(mission: MissionContext, length: float, margin: float) -> Blockage | None:
     """The first tracked object on the next ``length`` [m] of the mission's path."""
     return next((found for found in blockages_ahead(mission, margin) if found.distance <= length), None)
 
 
 class EndDrive(Leaf):
-    """End the drive beside which it runs: who came along the path has stood in the way for ``patience`` [s].
+    """End the drive beside which it runs: one that waits for the robot has stood in the way for ``patience`` [s].
 
-    Such a one waits for this robot, and neither gets on until one gives way. The mission's failure becomes
-    BLOCKED_PATH; where that one has stood for less, or a detour around it is driven, the node fails.
+    Neither gets on until one gives way. The mission's failure becomes BLOCKED_PATH; where that one has stood for less,
+    or a detour around it is driven, the node fails.
     """
 
     def __init__(self, name: str, patience: float, length: float = 3.0) -> None:
@@ -114,7 +123,7 @@ class EndDrive(Leaf):
         first = first_in_the_way(self.mission, self.length, MARGIN)
         if first is None or first.by.standing < self.patience or self._passes():
             return Status.FAILURE
-        text = f"object {first.by.number} came along the path and has stood for {first.by.standing:.1f} s"
+        text = f"object {first.by.number} waits for the robot and has stood for {first.by.standing:.1f} s"
         self.mission.fail(ActionResult(int(ExePathOutcome.BLOCKED_PATH), text))
         return Status.SUCCESS
 

@@ -10,7 +10,8 @@ nothing the map knows: back into a bay, around a corner, or a step aside in a ha
 tracked near its path is taken to go beside it, and that path is kept free, too, where there is such a place. The
 manoeuvre is driven slowly, each command checked as in every recovery, and searched anew where one is refused (see
 ``pulling_out``); afterwards it stands for a time that is drawn anew for each run, or until those who were tracked on
-its path, since it set out, have left it. Where there is no such place it ends with IMPASSABLE at once.
+its path, since it set out, have left it. Where it could not turn to its path there, it drives the manoeuvre back. Where
+there is no such place it ends with IMPASSABLE at once.
 
 Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
 goes first waits until the others have left its path; the others pull out, also off the path that the first one has
@@ -29,6 +30,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -76,6 +78,8 @@ class GiveWayRecovery(PullingOutRecovery):
     parameters: GiveWayParameters
     _left_at: Pose | None = None
     """Where it has set out to pull out."""
+    _track: FloatArray
+    """What it had driven by then (n, 3) [m]; to pull out is no part of its path."""
     _seen = False
     """Whether somebody has been on its path since then."""
 
@@ -102,7 +106,7 @@ class GiveWayRecovery(PullingOutRecovery):
         before = self._before(rivals)
         self.traffic.yields = True
         begin = self._left_at = request.motion.pose()
-        self._seen = False
+        self._track, self._seen = self.robot.recent_track(), False
         try:
             result = self.pull_out(request, self._keep_free, "its path")
             if result.success:
@@ -136,12 +140,18 @@ class GiveWayRecovery(PullingOutRecovery):
         return super().drive(request, velocity, looks_and_finished, obstacle_ahead)
 
     def _stand_aside(self, request: RecoveryRequest, begin: Pose, before: list[Announcement]) -> RecoveryResult:
-        """Wait beside the path, until the robots that go first have passed."""
+        """Wait beside the path, until the robots that go first have passed; go back where it cannot turn to it."""
         p, place = self.parameters, request.motion.pose()
         if before:
-            return self._wait_for(request, before, f"has pulled out at ({place.x:.2f}, {place.y:.2f}) for")
-        result = self._stand_until_clear(request, begin, p.wait + p.random_extra * float(self.rng.random()))
-        return replace(result, message=f"{result.message} at ({place.x:.2f}, {place.y:.2f}), beside its path")
+            result = self._wait_for(request, before, f"has pulled out at ({place.x:.2f}, {place.y:.2f}) for")
+        else:
+            result = self._stand_until_clear(request, begin, p.wait + p.random_extra * float(self.rng.random()))
+            result = replace(result, message=f"{result.message} at ({place.x:.2f}, {place.y:.2f}), beside its path")
+        if not result.success or self.turns_to(begin, request.motion.pose()):
+            return result
+        back = self.drive_back(request, partial(self.turns_to, begin))
+        text = f"{result.message}; drove back, as it cannot turn there{back.message and f': {back.message}'}"
+        return replace(back if request.cancel_token.cancelled else result, message=text)
 
     def _stand_until_clear(self, request: RecoveryRequest, begin: Pose, duration: float) -> RecoveryResult:
         """Stand for a time [s]; less, where somebody was seen on the way that it left at ``begin``, and now nobody."""
@@ -225,7 +235,7 @@ class GiveWayRecovery(PullingOutRecovery):
         """
         length, rivals = self.parameters.reach + self.parameters.distance, self.rivals()
         paths = [rival.points_ahead(length) for rival in self._before(rivals)]
-        own = in_plane_of(begin, course, paths_to_keep_free(course, self.robot.recent_track(), paths, length))
+        own = in_plane_of(begin, course, paths_to_keep_free(course, self._track, paths, length))
         known = () if rivals else self.navigation_map.tracked_objects(self.clock.now())
         distance, same_storey = self.parameters.distance, self.navigation_map.same_storey
         return paths_beside(self.on_map(begin), own, known, distance, same_storey)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import groupby
 
 import numpy as np
@@ -37,15 +38,31 @@ class ManoeuvreRecovery(GuardedRecovery):
         """How fast [m/s] a manoeuvre is driven, forward and backward."""
         return self.parameters.speed
 
-    def drive_along(self, begin: Pose, steps: list[Step], request: RecoveryRequest) -> RecoveryResult:
-        """Drive steps that begin at ``begin``, section by section, to the end or to what a command is refused for."""
+    def drive_along(
+        self,
+        begin: Pose,
+        steps: list[Step],
+        request: RecoveryRequest,
+        at: PlanarPose = (0.0, 0.0, 0.0),
+        is_enough: Callable[[Pose], bool] = lambda _: False,
+    ) -> RecoveryResult:
+        """Drive steps section by section, to the end or to what a command is refused for.
+
+        Parameters
+        ----------
+        begin : Pose
+            The steps are given in the plane of a robot that stands here.
+        at : PlanarPose
+            Where they begin.
+        is_enough : callable
+            Asked after each section whether the rest is of no use.
+        """
         frame = Transform(begin.position, begin.orientation, begin.frame_id, "begin")
-        at: PlanarPose = (0.0, 0.0, 0.0)
         for gear, section in groupby(steps, key=lambda step: step.gear):
             planned = [at, *(pose for step in section for pose in step.poses)]
             poses = [frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id="begin")) for x, y, yaw in planned]
             result = self._turn(request, poses[-1]) if gear == 0 else self._follow(request, poses, gear)
-            if not result.success:
+            if not result.success or is_enough(request.motion.pose()):
                 return result
             at = planned[-1]
         return RecoveryResult(RecoveryOutcome.SUCCESS)

@@ -11,8 +11,11 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from typing import TypeAlias
 
-from mbf_abstract.geometry import FloatArray, Pose
-from mbf_abstract.maps.manoeuvres import Step
+import numpy as np
+
+from mbf_abstract.geometry import FloatArray, Pose, Twist
+from mbf_abstract.geometry.arcs import in_robot_frame
+from mbf_abstract.maps.manoeuvres import Step, driven_back
 from mbf_abstract.maps.pull_out import find_pull_out, paths_on_storey
 from mbf_abstract.maps.recoveries.manoeuvre_recovery import ManoeuvreParameters, ManoeuvreRecovery
 from mbf_abstract.maps.recoveries.wait import stand
@@ -46,6 +49,8 @@ class PullingOutRecovery(ManoeuvreRecovery):
     """Base of the recoveries that pull out."""
 
     parameters: PullingOutParameters
+    _driven: tuple[Pose, list[Step]] | None = None
+    """The last manoeuvre that led to a place, and where it began."""
 
     @property
     def meeting_distance(self) -> float:
@@ -87,7 +92,7 @@ class PullingOutRecovery(ManoeuvreRecovery):
         """
         p, token = self.parameters, request.cancel_token
         result = RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
-        course = request.motion.pose()
+        course, self._driven = request.motion.pose(), None
         for attempt in range(ATTEMPTS):
             if attempt:
                 paused = stand(request, PAUSE)  # somebody who moves there stops before this robot, or passes
@@ -103,8 +108,25 @@ class PullingOutRecovery(ManoeuvreRecovery):
             self.traffic.set_cannot_yield(False)
             result = self.drive_along(begin, steps, request)
             if result.outcome != RecoveryOutcome.IMPASSABLE:
+                self._driven = begin, steps
                 break
         return result
+
+    def drive_back(self, request: RecoveryRequest, is_enough: Callable[[Pose], bool]) -> RecoveryResult:
+        """Drive the manoeuvre that led to the place where it stands back, until it ``is_enough`` after a section."""
+        if self._driven is None or not self._driven[1]:
+            return RecoveryResult(RecoveryOutcome.SUCCESS)
+        begin, steps = self._driven
+        return self.drive_along(begin, driven_back(steps), request, steps[-1].poses[-1], is_enough)
+
+    def turns_to(self, begin: Pose, pose: Pose) -> bool:
+        """Whether it can turn on the spot to its path, straight on from ``begin``; a car, which never does, counts."""
+        on = in_robot_frame(begin, np.asarray(pose.position))[0] + self.parameters.distance
+        ahead, left = in_robot_frame(pose, np.asarray(begin.position) + on * begin.rotation[:, 0])[:2]
+        turn = math.atan2(left, ahead)
+        command, seconds = Twist.planar(wz=math.copysign(1.0, turn)), abs(turn)
+        is_car, navigation_map = self.min_turning_radius > 0.0, self.navigation_map
+        return is_car or not navigation_map.obstacle_on_path(self.on_map(pose), command, seconds)
 
     def _manoeuvre(self, begin: Pose, keep_free: Iterable[FloatArray], request: RecoveryRequest) -> list[Step] | None:
         """Shortest manoeuvre in the plane of ``begin`` to a place beside the first of these for which there is one."""

@@ -49,6 +49,8 @@ class Watched(RigMotion):
 
     def send(self, command):
         pose = self.pose()
+        self.poses.append(pose)
+        self.robot._extend_track(pose.position)
         self.on_command(pose)
         self.least_gap = min(self.least_gap, float(np.hypot(*(self.walls - (pose.x, pose.y)).T).min(initial=math.inf)))
         return super().send(command)
@@ -71,7 +73,8 @@ def give_way(world):
             made.plugin.traffic = traffic or Traffic()
             token = CancelToken()
             motion = Watched(made, token, lambda pose: pose)
-            motion.on_command = on_command or motion.on_command
+            motion.on_command, motion.poses = on_command or motion.on_command, []
+            motion.robot = made.plugin.robot
             x, y = np.meshgrid(np.arange(81) * 0.1, np.arange(61) * 0.1)  # the vertices of the mesh
             motion.walls = np.column_stack([x[lethal(x, y)], y[lethal(x, y)]])
             result = made.plugin.run_behavior(RecoveryRequest(motion, token))

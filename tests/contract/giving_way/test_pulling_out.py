@@ -183,6 +183,47 @@ def test_it_follows_a_path_that_is_not_along_x(give_way):
     assert motion.least_gap > RADIUS - 0.05
 
 
+def test_what_it_drives_to_pull_out_is_no_path_that_it_keeps_free(give_way, world):
+    """Somebody stops it when it is nearly there: then it stands far enough beside its path, and need not go on."""
+    seen, stops = world.sensing(), []
+
+    def somebody_passes(pose):
+        if not stops and abs(pose.y - 3.0) > 0.65:
+            around = np.linspace(0.0, 2.0 * math.pi, 60)
+            world.see(seen, *((pose.x + 0.45 * math.cos(a), pose.y + 0.45 * math.sin(a)) for a in around))
+            stops.append(pose)
+        elif stops:
+            seen.clear()
+            seen.update(pose, 0.0)
+
+    result, motion = give_way(hall, distance=0.6, navigation_map=seen, on_command=somebody_passes)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert motion.end.distance_to(stops[0]) < 0.3
+
+
+def aisle(half_width):
+    """A costmap of a corridor along y = 3, and an aisle off it ahead; the outline is 0.6 m long and 0.4 m wide."""
+    x, y = np.meshgrid((np.arange(400) + 0.5) * 0.02, (np.arange(300) + 0.5) * 0.02)
+    inside = (np.abs(y - 3.0) < 0.6) | ((np.abs(x - 5.5) < half_width) & (y > 3.0) & (y < 5.0))
+    outline = [(0.3, 0.2), (0.3, -0.2), (-0.3, -0.2), (-0.3, 0.2)]
+    layers = ({"name": "walls", "type": "static"},)
+    parameters = CostmapParameters(resolution=0.02, footprint=outline, max_age=0.0, layers=layers)
+    walls = Costmap(np.where(inside, 0, 254).astype(np.uint8), 0.02)
+    costmap = build_layered_costmap(parameters, {}, static_map=walls)
+    costmap.update(START, 0.0)
+    return costmap
+
+
+@pytest.mark.parametrize(("half_width", "goes_back"), [(0.33, True), (1.2, False)])
+def test_from_where_it_cannot_turn_to_its_path_it_goes_back_the_way_it_came(give_way, half_width, goes_back):
+    """It drives forward into an aisle in which it does not fit across. A robot on a mesh is a disc, which turns."""
+    result, motion = give_way(hall, navigation_map=aisle(half_width))
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert ("drove back" in result.message) == goes_back
+    assert max(pose.y for pose in motion.poses) > 3.7
+    assert (motion.end.y < 3.3) == goes_back
+
+
 def test_a_drive_that_somebody_stops_goes_on_once_they_are_gone(give_way, world):
     """They surround the robot, and are gone when the robot stands."""
     seen, stops = world.sensing(), []

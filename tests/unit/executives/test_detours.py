@@ -35,7 +35,8 @@ def on_the_path(monkeypatch):
 
 
 def somebody(motion=Motion.WAITING, standing=3.0, distance=1.0, along=0.0):
-    return Blockage(SimpleNamespace(motion=motion, standing=standing, number=7), 0, distance, along)
+    known = SimpleNamespace(motion=motion, standing=standing, number=7, course=(along, 0.0))
+    return Blockage(known, 0, distance, along)
 
 
 def creep(session, cycles=80):

@@ -148,7 +148,7 @@ def test_who_is_in_the_way_decides_between_waiting_and_planning_around(
 ):
     session = make_session()
     session.controller.play(BLOCKED, session.controller.follow)
-    somebody = Blockage(SimpleNamespace(motion=motion, standing=3.0), 0, 1.0)
+    somebody = Blockage(SimpleNamespace(motion=motion, standing=3.0, course=(0.0, 0.0)), 0, 1.0)
     monkeypatch.setattr(type(session.server), "queries", SimpleNamespace(what_blocks=lambda path, margin: (somebody,)))
     options = replace(OPTIONS, wait="relax", give_way="back_up", reuse_path=reuse_path)
     result = run(session, navigation_tree(options))
@@ -161,7 +161,7 @@ def test_who_is_in_the_way_decides_between_waiting_and_planning_around(
 
 def on_the_path(session, monkeypatch, motion):
     """Somebody has been standing a metre ahead for three seconds, and the map sees the path blocked there."""
-    somebody = Blockage(SimpleNamespace(motion=motion, standing=3.0), 0, 1.0)
+    somebody = Blockage(SimpleNamespace(motion=motion, standing=3.0, course=(0.0, 0.0)), 0, 1.0)
     blocked = SimpleNamespace(state=CellState.LETHAL)
     queries = SimpleNamespace(what_blocks=lambda path, margin: (somebody,), check_path=lambda *asked: blocked)
     monkeypatch.setattr(type(session.server), "queries", queries)

@@ -231,7 +231,7 @@ def among(tree, *blockages, path=AHEAD, lost=False):
         return tuple(Blockage(somebody(motion), 0, distance) for motion, distance in blockages)
 
     def somebody(motion):
-        return SimpleNamespace(motion=motion, standing=0.0 if motion is Motion.MOVING else 1.4)
+        return SimpleNamespace(motion=motion, standing=0.0 if motion is Motion.MOVING else 1.4, course=(0.0, 0.0))
 
     navigator = SimpleNamespace(server=SimpleNamespace(queries=SimpleNamespace(what_blocks=what_blocks)))
     mission = SimpleNamespace(navigator=navigator, path=path, path_to_follow=lambda: path)
@@ -290,12 +290,23 @@ def test_one_node_may_stand_for_several_motions_and_for_nobody(scripted, tick):
     assert plan.ticks == 3
 
 
-@pytest.mark.parametrize(("along", "chosen"), [(-1.0, "came"), (-0.5, "other"), (0.0, "other"), (1.0, "other")])
-def test_who_waits_and_came_along_the_path_has_a_child_of_its_own(scripted, tick, along, chosen):
+@pytest.mark.parametrize(
+    ("along", "course", "standing", "chosen"),
+    [
+        (-1.0, (-0.2, 0.0), 1.5, "came"),
+        (-0.5, (-0.1, 0.2), 1.5, "other"),
+        (-0.5, (-0.1, 0.2), 6.0, "came"),
+        (1.0, (0.2, 0.0), 5.9, "other"),
+        (1.0, (0.2, 0.0), 6.0, "came"),
+        (0.0, (0.0, 0.0), 6.0, "other"),
+    ],
+)
+def test_who_waits_for_the_robot_has_a_child_of_its_own(scripted, tick, along, course, standing, chosen):
+    """One that came along the path, or that was seen to move and stands too long to load: it may have turned round."""
     nodes = {name: scripted("S") for name in ("other", "came")}
     tree = PickByMotion("who?", {Motion.WAITING: nodes["other"]}, scripted("F"), nodes["came"])
     among(tree)
-    somebody = Blockage(SimpleNamespace(motion=Motion.WAITING, standing=1.5), 0, 1.0, along)
-    tree.mission.navigator.server.queries.what_blocks = lambda path, margin: (somebody,)
+    waits = SimpleNamespace(motion=Motion.WAITING, standing=standing, course=course)
+    tree.mission.navigator.server.queries.what_blocks = lambda path, margin: (Blockage(waits, 0, 1.0, along),)
     assert tick(tree) == "S"
     assert [name for name, node in nodes.items() if node.ticks] == [chosen]
