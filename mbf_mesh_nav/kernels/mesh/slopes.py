@@ -7,16 +7,47 @@ import math
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import Count, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inlined_kernel, kernel
 
 
 @kernel
 def inclinations(normals: FloatArray) -> Float32Array:
     """Angle (V,) float32 [rad] between unit normals (V, 3) and the vertical, from 0 to pi."""
+    cosines = np.empty(normals.shape[0], dtype=np.float64)
+    for vertex in range(normals.shape[0]):
+        cosines[vertex] = normals[vertex, 2]  # side by side: from every third number the loop below takes twice as long
     angles = np.empty(normals.shape[0], dtype=np.float32)
     for vertex in range(normals.shape[0]):
-        angles[vertex] = math.acos(min(max(normals[vertex, 2], -1.0), 1.0))
+        angles[vertex] = arc_cosine(min(max(cosines[vertex], -1.0), 1.0))
     return angles
+
+
+@inlined_kernel
+def arc_cosine(cosine: float) -> float:
+    """Angle [rad] to a cosine from -1 to 1, to one unit in the last place.
+
+    For loops over many: unlike the C library's it is plain arithmetic, done for several at once and alike on every CPU.
+    """
+    size = abs(cosine)
+    steep = size <= 0.5
+    square = size * size if steep else 0.5 * (1.0 - size)  # sin^2 of the angle's complement, or of half the angle
+    sine = size if steep else math.sqrt(square)
+    # (asin(s) - s) / s^3 in z = s^2 for s from 0 to 1/2: its Chebyshev fit, wrong by 3e-16 at most.
+    fit = 0.028169218060881414
+    fit = -0.010749050339697808 + square * fit
+    fit = 0.01603551434914882 + square * fit
+    fit = 0.0078029494773533175 + square * fit
+    fit = 0.011875494382636922 + square * fit
+    fit = 0.013929652902326633 + square * fit
+    fit = 0.017355259955786323 + square * fit
+    fit = 0.02237204763174451 + square * fit
+    fit = 0.03038194736709848 + square * fit
+    fit = 0.044642857103423646 + square * fit
+    fit = 0.07500000000020764 + square * fit
+    fit = 0.1666666666666665 + square * fit
+    angle = sine + sine * square * fit
+    acute = 0.5 * math.pi - angle if steep else 2.0 * angle
+    return acute if cosine >= 0.0 else math.pi - acute
 
 
 @kernel

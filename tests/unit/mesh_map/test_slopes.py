@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from mbf_mesh_nav.kernels.mesh.slopes import inclinations, tilt_of_normals
+from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.mesh.slopes import arc_cosine, inclinations, tilt_of_normals
 
 HEADINGS = np.arange(16) * 2.0 * math.pi / 16
 
@@ -20,6 +21,25 @@ def test_inclination_is_the_angle_to_the_vertical_from_level_to_upside_down():
     normals = np.concatenate([extremes, unit_normals()])
     expected = [math.acos(min(max(z, -1.0), 1.0)) for z in normals[:, 2].tolist()]
     assert inclinations(normals).tolist() == np.float32(expected).tolist()
+
+
+def test_arc_cosines_are_those_of_the_c_library_to_one_unit_in_the_last_place():
+    random = np.random.default_rng(1)
+    near_one = 1.0 - 10.0 ** random.uniform(-16.0, 0.0, 20_000)
+    between = random.uniform(-1.0, 1.0, 20_000)
+    cosines = np.concatenate([[-1.0, -0.5, -0.0, 0.0, 0.5, 1.0], near_one, -near_one, between])
+    expected = np.array([math.acos(cosine) for cosine in cosines.tolist()])
+    found = arc_cosines(cosines)
+    assert np.all(np.abs(found - expected) <= np.spacing(expected))
+    assert np.float32(found).tolist() == np.float32(expected).tolist()
+
+
+@kernel
+def arc_cosines(cosines):
+    angles = np.empty(len(cosines), dtype=np.float64)
+    for place in range(len(cosines)):
+        angles[place] = arc_cosine(cosines[place])
+    return angles
 
 
 def test_roll_and_pitch_are_those_of_a_robot_on_the_tangent_plane():
