@@ -6,9 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from mbf_abstract.geometry.arithmetic import tan
 from mbf_abstract.parameters import ParameterModel, parameter
@@ -22,9 +19,10 @@ from mbf_mesh_nav.building.slabs import over_unseen_ground, without_undersides
 from mbf_mesh_nav.building.surface_patches import Grid, SurfacePatches
 from mbf_mesh_nav.kernels.building.columns import first_heights, sort_into_cells, split_columns
 from mbf_mesh_nav.kernels.building.quads import distances_to_faces, faces_of_patches
+from mbf_mesh_nav.kernels.mesh.incidence import faces_of_vertices
 from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges, unit_face_normals
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.mesh.topology import faces_of_vertices
+from mbf_mesh_nav.mesh.topology import group_of_each
 
 POINTS_PER_CELL = 4.0
 SMALLEST_CELL, LARGEST_CELL, CELL_STEP = 0.05, 1.0, 0.05
@@ -213,9 +211,7 @@ def _is_large(patches: SurfacePatches, faces: IntArray, least_area: float) -> Bo
     """
     across = faces_across_edges(faces, *faces_of_vertices(faces, len(patches.cells)))
     face, corner = np.nonzero(across >= 0)
-    ends = (face, across[face, corner])
-    graph = coo_array((np.ones(len(face), dtype=np.int8), ends), (len(faces), len(faces)))
-    groups: NDArray[np.int32] = connected_components(graph, directed=False)[1]
+    groups = group_of_each(np.stack([face, across[face, corner]], axis=1), len(faces))
     counts = np.bincount(groups)
     tops, grounds = (
         np.bincount(groups, weights=mask[faces].sum(axis=1)) / (3.0 * counts)

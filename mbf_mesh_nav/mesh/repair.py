@@ -25,11 +25,12 @@ from mbf_mesh_nav.kernels.mesh.defects import (
     superfluous_faces,
     winding_flips,
 )
+from mbf_mesh_nav.kernels.mesh.incidence import faces_of_vertices
 from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges
 from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh, shaped_arrays
 from mbf_mesh_nav.mesh.mesh_report import Finding, MeshError, MeshReport
 from mbf_mesh_nav.mesh.slivers import without_slivers
-from mbf_mesh_nav.mesh.topology import faces_of_vertices, group_of_each
+from mbf_mesh_nav.mesh.topology import group_of_each
 from mbf_mesh_nav.mesh.welding import join_boundaries, rounding_distance, same_position
 
 REPAIRS: dict[str, str] = {
@@ -221,8 +222,7 @@ class _Check:
 
     def components(self, mesh: CheckedMesh) -> CheckedMesh:
         used = mesh.used
-        edges = np.stack([mesh.faces[:, :2].ravel(), mesh.faces[:, 1:].ravel()])
-        labels = group_of_each(edges, len(mesh.vertices))
+        labels = group_of_each(mesh.faces[:, (0, 1, 1, 2)].reshape(-1, 2), len(mesh.vertices))
         names, first, sizes = np.unique(labels[used], return_index=True, return_counts=True)
         if len(names) < 2:
             return mesh

@@ -13,10 +13,10 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.defects import faces_without_area
+from mbf_mesh_nav.kernels.mesh.incidence import faces_of_vertices
 from mbf_mesh_nav.kernels.mesh.slivers import flip_slivers
 from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges
 from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh, edge_lengths
-from mbf_mesh_nav.mesh.topology import faces_of_vertices
 from mbf_mesh_nav.mesh.welding import first_of_group
 
 SAME_POINT_SHARE = 1e-9
@@ -55,5 +55,5 @@ def _same_points(vertices: FloatArray, slivers: IntArray) -> IntArray:
     """Vertex that stands for each vertex (V,) once the corners of slivers (n, 3) in one place are joined."""
     lengths = edge_lengths(vertices, slivers)
     sliver, corner = np.nonzero(lengths <= SAME_POINT_SHARE * lengths.max(axis=1, keepdims=True))
-    pairs = np.stack([slivers[sliver, corner], slivers[sliver, (corner + 1) % 3]])
+    pairs = np.stack([slivers[sliver, corner], slivers[sliver, (corner + 1) % 3]], axis=1)
     return first_of_group(pairs, len(vertices))

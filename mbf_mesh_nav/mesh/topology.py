@@ -13,11 +13,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components
 
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh import topology as kernels
+from mbf_mesh_nav.kernels.mesh.incidence import faces_of_vertices, groups_of_pairs, neighbours_of_vertices
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
 
@@ -112,8 +111,7 @@ def build_topology(mesh: CheckedMesh) -> MeshTopology:
     sorted_faces = np.ascontiguousarray(position[faces[face_order]])
 
     face_offsets, incident = faces_of_vertices(sorted_faces, len(sorted_vertices))
-    graph = _neighbour_graph(sorted_faces, len(sorted_vertices))
-    offsets, neighbours = graph.indptr, graph.indices
+    offsets, neighbours = neighbours_of_vertices(sorted_faces, face_offsets, incident)
     edges, lengths = kernels.edges_of_neighbours(sorted_vertices, offsets, neighbours)
     face_normals = kernels.unit_face_normals(sorted_vertices, sorted_faces)
     return MeshTopology(
@@ -128,27 +126,11 @@ def build_topology(mesh: CheckedMesh) -> MeshTopology:
         vertex_face_offsets=face_offsets,
         vertex_faces=incident,
         face_neighbours=kernels.faces_across_edges(sorted_faces, face_offsets, incident),
-        components=group_of_each(edges.T, len(vertices)),
+        components=group_of_each(edges, len(vertices)),
         input_to_internal=np.where(mesh.input_to_vertex >= 0, position[mesh.input_to_vertex], -1).astype(np.int32),
         internal_to_input=mesh.vertex_source[vertex_order],
         internal_to_input_faces=mesh.face_source[face_order],
     )
-
-
-def faces_of_vertices(faces: IntArray, vertex_count: int) -> tuple[IntArray, IntArray]:
-    """Incident faces of every vertex as CSR: offsets (V+1,), faces (3F,), ascending within a vertex."""
-    corners_of_faces = np.arange(0, faces.size + 1, 3, dtype=np.int32)
-    marks = np.ones(faces.size, dtype=np.int8)
-    table = csr_array((marks, faces.ravel(), corners_of_faces), shape=(len(faces), vertex_count)).tocsc()
-    return table.indptr, table.indices
-
-
-def _neighbour_graph(faces: IntArray, vertex_count: int) -> csr_array:
-    """Square matrix whose row of a vertex names its neighbours over mesh edges, ascending and without repetition."""
-    starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    upward = np.minimum(starts, ends), np.maximum(starts, ends)
-    once = coo_array((np.ones(faces.size, dtype=np.int8), upward), shape=(vertex_count, vertex_count)).tocsr()
-    return once + once.T
 
 
 def morton_order(points: FloatArray, around: FloatArray) -> NDArray[np.int64]:
@@ -159,7 +141,5 @@ def morton_order(points: FloatArray, around: FloatArray) -> NDArray[np.int64]:
 
 
 def group_of_each(pairs: NDArray[np.integer], count: int) -> IntArray:
-    """Number (count,) of the group of each of ``count`` things, where the two of each of the pairs (2, n) share one."""
-    links = coo_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(count, count))
-    groups: IntArray = connected_components(links, directed=False)[1]
-    return groups
+    """Number (count,) of the group of each of ``count`` things, where the two of each of the pairs (n, 2) share one."""
+    return groups_of_pairs(np.ascontiguousarray(pairs, dtype=np.int32), count)

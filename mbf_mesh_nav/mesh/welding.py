@@ -49,7 +49,7 @@ def join_boundaries(vertices: FloatArray, face_neighbours: IntArray, faces: IntA
     pairs = _pairs_within(vertices[boundary], distance)
     if not len(pairs):
         return target
-    target[boundary] = boundary[first_of_group(pairs.T, len(boundary))]
+    target[boundary] = boundary[first_of_group(pairs, len(boundary))]
     # Corners of one face that are this close are a fine detail and no seam: leave all of them where they are.
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     detail = target[start[(target[start] == target[end]) & (start != end)]]

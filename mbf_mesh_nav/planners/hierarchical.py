@@ -216,7 +216,7 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         there, snapshot = found
         # Free vertices that are connected have a path all or none: one of each group is tried.
         free = ~snapshot.blocked(self._tiled.profile.cost_limit)
-        group = group_of_each(there.edges[free[there.edges].all(axis=1)].T, len(free))
+        group = group_of_each(there.edges[free[there.edges].all(axis=1)], len(free))
         offsets = norm(there.vertices - np.asarray(goal.position))
         near = np.flatnonzero(free & (offsets <= within))
         without_path: set[int] = set()

@@ -15,13 +15,14 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_mesh_nav.arrays import BoolArray, IntArray
+from mbf_mesh_nav.arrays import BoolArray
 from mbf_mesh_nav.layers.combinations.combination import CombinationLayer
 from mbf_mesh_nav.layers.inflation import InflationLayer
 from mbf_mesh_nav.map.height_error import HeightErrorParameters, errors_for
 from mbf_mesh_nav.map.layer import MeshLayer
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.surface_point import nearest_corner
+from mbf_mesh_nav.mesh.topology import group_of_each
 
 
 def as_permanent(problem: PlanResult, mesh_map: MeshMap, request: PlanRequest, index: int) -> PlanResult:
@@ -55,7 +56,8 @@ def what_separates(mesh_map: MeshMap, start: Pose, goal: Pose, tolerance: float)
     first, last = (mesh_map.faces[face] for face in ends)
     if closed[first].any():
         return ()
-    pieces = _pieces(mesh_map.topology.edges, closed)
+    edges = mesh_map.topology.edges
+    pieces = group_of_each(edges[~closed[edges].any(axis=1)], len(closed))
     near = norm(mesh_map.vertices - np.asarray(goal.position)) <= tolerance
     near[last] = True
     reached = np.isin(pieces, pieces[first]) & ~closed
@@ -108,14 +110,3 @@ def _is_fixed(layer: MeshLayer) -> bool:
 def _has_margin(layer: MeshLayer) -> bool:
     """Whether what a layer closes depends on errors of the map."""
     return isinstance(layer.parameters, HeightErrorParameters) and bool(np.any(errors_for(layer)))
-
-
-def _pieces(edges: IntArray, closed: BoolArray) -> IntArray:
-    """Numbers (V,) of the connected pieces of the ground that is not closed."""
-    from scipy import sparse  # takes long to import, and most plans are found
-    from scipy.sparse import csgraph
-
-    kept = edges[~closed[edges].any(axis=1)]
-    shape = (len(closed), len(closed))
-    graph = sparse.coo_matrix((np.ones(len(kept), dtype=np.bool_), (kept[:, 0], kept[:, 1])), shape=shape)
-    return np.asarray(csgraph.connected_components(graph, directed=False)[1])

@@ -74,7 +74,7 @@ def _normals_of_solids(vertices: FloatArray, corners: IntArray) -> tuple[FloatAr
     doubles = np.sqrt(np.sum(across * across, axis=1))
     normals = across / np.maximum(doubles, np.finfo(np.float64).tiny)[:, None]
     starts, ends = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-    group = group_of_each(np.stack([starts, ends]), len(vertices))
+    group = group_of_each(np.stack([starts, ends], axis=1), len(vertices))
     is_open = np.zeros(len(vertices), dtype=np.bool_)
     is_open[group[_without_opposite(starts, ends, len(vertices))]] = True
     of_face = group[corners[:, 0]]

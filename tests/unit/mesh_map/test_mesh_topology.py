@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_mesh_nav.kernels.mesh.defects import superfluous_faces
+from mbf_mesh_nav.kernels.mesh.incidence import faces_of_vertices
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.mesh.topology import faces_of_vertices
 
 
 def random_map(seed: int, nx: int = 7, ny: int = 6, shuffled: bool = True) -> tuple[MeshMap, np.ndarray, np.ndarray]:
