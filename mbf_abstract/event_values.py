@@ -74,6 +74,8 @@ class _Converter:
         self._left -= 1
         if type(value) is float:  # coordinates, most of what is nested
             return _plain_float(value)
+        if type(value) is list or type(value) is tuple:  # of coordinates
+            return self._convert_sequence(value, depth)
         if isinstance(value, Enum):
             return value.name
         if isinstance(value, np.generic):
@@ -92,12 +94,17 @@ class _Converter:
 
     def _convert_collection(self, value: Any, depth: int) -> JsonValue:
         if depth >= MAX_DEPTH:
-            return f"{type(value).__name__} nested deeper than {MAX_DEPTH}"
+            return _nested_too_deep(value)
         if isinstance(value, np.ndarray):
             too_large = value.size > self._left
             return f"array of shape {value.shape}" if too_large else self.convert(value.tolist(), depth + 1)
         if isinstance(value, Mapping):
             return self._convert_mapping(value, depth)
+        return self._convert_sequence(value, depth)
+
+    def _convert_sequence(self, value: list[Any] | tuple[Any, ...], depth: int) -> JsonValue:
+        if depth >= MAX_DEPTH:
+            return _nested_too_deep(value)
         converted: list[JsonValue] = []
         for item in value:
             if self._left <= 0:
@@ -112,6 +119,10 @@ class _Converter:
                 return {**converted, "...": f"{len(value) - len(converted)} more values left out"}
             converted[shortened(_text_of(key))] = self.convert(item, depth + 1)
         return converted
+
+
+def _nested_too_deep(value: object) -> str:
+    return f"{type(value).__name__} nested deeper than {MAX_DEPTH}"
 
 
 def _plain_float(value: float) -> JsonValue:

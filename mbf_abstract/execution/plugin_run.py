@@ -104,7 +104,8 @@ class PluginRun(Generic[P]):
             self.handle = handle
             self._stop_asked = None  # a cancel of the goal before is none of this one
         handle.on_wake(lambda: self.runtime.supervisor.poke(self._watch))
-        self.runtime.supervisor.poke(self._watch)
+        if handle.cancel_requested or handle.paused:  # before it could wake anybody
+            self.runtime.supervisor.poke(self._watch)
 
     @property
     def why_given_up(self) -> str:

@@ -7,7 +7,7 @@ origin of ``source`` lies in ``target``. Neighbouring names cancel: ``T_map_base
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
@@ -68,22 +68,23 @@ class Transform:
     static: bool = False
 
     def __post_init__(self) -> None:
-        label = f"transform {self.parent!r} -> {self.child!r}"
-        for name in (self.parent, self.child):
-            if problem := frame_name_problem(name):
-                raise InvalidTransformError(f"{label}: {problem}")
+        if problem := frame_name_problem(self.parent) or frame_name_problem(self.child):
+            raise self._invalid(problem)
         translation, rotation = tuple(map(float, self.translation)), tuple(map(float, self.rotation))
         if len(translation) != 3 or len(rotation) != 4:
-            raise InvalidTransformError(f"{label}: needs 3 and 4 numbers, got {translation} and {rotation}")
+            raise self._invalid(f"needs 3 and 4 numbers, got {translation} and {rotation}")
         if not all(map(math.isfinite, (*translation, *rotation, self.stamp))):
-            raise InvalidTransformError(f"{label}: not finite: {translation} {rotation} at {self.stamp}")
+            raise self._invalid(f"not finite: {translation} {rotation} at {self.stamp}")
         x, y, z, w = rotation
         norm_squared = x * x + y * y + z * z + w * w
         if abs(norm_squared - 1.0) >= QUATERNION_NORM_TOLERANCE:
-            raise InvalidTransformError(f"{label}: squared norm of the rotation is {norm_squared:.6g}, expected 1")
+            raise self._invalid(f"squared norm of the rotation is {norm_squared:.6g}, expected 1")
         norm = math.sqrt(norm_squared)
         object.__setattr__(self, "translation", translation)
         object.__setattr__(self, "rotation", (x / norm, y / norm, z / norm, w / norm))
+
+    def _invalid(self, problem: str) -> InvalidTransformError:
+        return InvalidTransformError(f"transform {self.parent!r} -> {self.child!r}: {problem}")
 
     @classmethod
     def from_pose(cls, pose: Pose, child: str) -> Transform:
@@ -130,7 +131,12 @@ class Transform:
             start[1] + ratio * (end[1] - start[1]),
             start[2] + ratio * (end[2] - start[2]),
         )
-        return replace(self, translation=translation, rotation=slerp(self.rotation, later.rotation, ratio), stamp=stamp)
+        rotation = slerp(self.rotation, later.rotation, ratio)
+        return Transform(translation, rotation, self.parent, self.child, stamp, self.static)
+
+    def at(self, stamp: float) -> Transform:
+        """Return the same transform with another stamp [s]."""
+        return Transform(self.translation, self.rotation, self.parent, self.child, stamp, self.static)
 
 
 def frame_name_problem(name: str) -> str:
@@ -175,10 +181,10 @@ def composed(target_steps: list[Transform], source_steps: list[Transform], time:
     T_common_target, T_common_source = _product(target_steps), _product(source_steps)
     if T_common_target is None:
         assert T_common_source is not None
-        return replace(T_common_source, stamp=time)
+        return T_common_source.at(time)
     T_target_common = T_common_target.inverse()
     T_target_source = T_target_common if T_common_source is None else T_target_common @ T_common_source
-    return replace(T_target_source, stamp=time)
+    return T_target_source.at(time)
 
 
 def _product(steps: list[Transform]) -> Transform | None:

@@ -143,9 +143,8 @@ class TransformBuffer:
         UnknownFrameError, ConnectivityError, ExtrapolationError, StaleTransformError
             See there.
         """
-        for name in (target, source):
-            if problem := frame_name_problem(name):
-                raise InvalidTransformError(f"no transform from {source!r} to {target!r}: {problem}")
+        if problem := frame_name_problem(target) or frame_name_problem(source):
+            raise InvalidTransformError(f"no transform from {source!r} to {target!r}: {problem}")
         if target == source:
             return Transform((0.0, 0.0, 0.0), IDENTITY_ROTATION, target, source, time or now or 0.0, static=True)
         with self._lock:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numbers
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import Field, fields
+from functools import cache
 from typing import Any, ClassVar, Protocol
 
 from mbf_abstract.geometry import Path, Pose
@@ -19,14 +20,19 @@ class Goal(Protocol):
 
 def check_fields(goal: Goal) -> None:
     """Raise TypeError for the first field that is not of its kind; sequences become tuples."""
-    for one in fields(goal):
-        value = getattr(goal, one.name)
-        if value is None and one.name in MAY_BE_NONE:
+    for name in _names_of_fields(type(goal)):
+        value = getattr(goal, name)
+        if value is None and name in MAY_BE_NONE:
             continue
-        if one.name in SEQUENCES:
-            object.__setattr__(goal, one.name, SEQUENCES[one.name](one.name, value))
-        elif one.name in VALUES:
-            VALUES[one.name](one.name, value)
+        if name in SEQUENCES:
+            object.__setattr__(goal, name, SEQUENCES[name](name, value))
+        elif name in VALUES:
+            VALUES[name](name, value)
+
+
+@cache
+def _names_of_fields(kind: type[Goal]) -> tuple[str, ...]:
+    return tuple(one.name for one in fields(kind))
 
 
 def _expect(kind: type | tuple[type, ...], wanted: str) -> Callable[[str, object], None]:
@@ -55,7 +61,7 @@ def _sequence(check: Callable[[str, object], None], wanted: str) -> Callable[[st
 
 _pose = _expect(Pose, "a Pose, such as Pose.planar(x, y, yaw)")
 _name = _expect(str, "the name of a plugin")
-_number = _expect(numbers.Real, "a number")
+_number = _expect((float, numbers.Real), "a number")
 
 MAY_BE_NONE = {"start_pose", "dist_tolerance", "angle_tolerance", "goal_area", "recovery_behaviors", "max_retries"}
 SEQUENCES = {
