@@ -58,6 +58,7 @@ class BulletWorld(SimulatedWorld):
     def __init__(self, time_step: float = TIME_STEP) -> None:
         super().__init__(time_step)
         self.bullet = connect(time_step)
+        self._simulate_step = self.bullet.stepSimulation  # the client makes its functions anew at each use
         self.ground_bodies: set[int] = set()
         self.has_moving_bodies = False
         self._static: list[Surface] = []
@@ -76,7 +77,7 @@ class BulletWorld(SimulatedWorld):
         self.step_count = 0
 
     def _move_on(self) -> None:
-        self.bullet.stepSimulation()
+        self._simulate_step()
         self.step_count += 1
 
     def add_heightfield(self, terrain: Heightfield) -> int:
