@@ -162,8 +162,8 @@ class MeshLayer(map_layer.MapLayer):
             The values are no numbers.
         """
         costs, lethal = self._legal("costs", costs, np.float32), self._legal("lethal flags", lethal, np.bool_)
-        if (missing := np.isnan(costs)).any():
-            costs = np.where(missing, np.float32(np.inf), costs)
+        if np.isnan(costs.min(initial=np.inf)):  # NaN where any cost is; a mask of all takes longer
+            costs = np.where(np.isnan(costs), np.float32(np.inf), costs)
         changed = np.flatnonzero((costs != self._costs) | (lethal != self._lethal)).astype(np.int32)
         self._costs, self._lethal = costs, lethal
         return changed
