@@ -37,7 +37,8 @@ from mbf_mesh_nav.kernels.wave.straight_corridors import straighten
 
 def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
     """Return each kernel with an example of its arguments, in the order in which a start needs them."""
-    rows, face_rows, reals = _example(float, 2), _example(np.int32, 2), _example(float)
+    rows, face_rows, float_rows = _example(float, 2), _example(np.int32, 2), _example(np.float32, 2)
+    reals = _example(float)
     numbers, floats, flags, octets = (_example(kind) for kind in (np.int32, np.float32, np.bool_, np.uint8))
     points, faces, listed, costs = (_fixed(array) for array in (rows, face_rows, numbers, floats))
     surface = Surface(points, faces, points, faces, listed, listed, listed, listed)
@@ -62,7 +63,7 @@ def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
         (repair_distances, (surface, 0.0, flags, flags, numbers, floats, face_rows)),
         (set_fading_costs, (floats, numbers, 0, 0.0, 0.0, 0.0, 0.0, floats)),
         (build_corner_ends, (faces, listed, listed)),
-        (write_corner_weights, (listed, face_rows, listed, listed, costs, numbers, _example(np.float32, 2), octets)),
+        (write_corner_weights, (listed, face_rows, listed, listed, costs, numbers, float_rows, flags, octets)),
         (closest_face, (points, faces, rows, numbers, 0.0, 0.0, 0.0, 0.0, 0)),
         (propagate_distances, (graph, floats, numbers, numbers, 0.0, numbers, floats, octets, bound)),
         (points_on_branch, (numbers, 0, points, points, True)),

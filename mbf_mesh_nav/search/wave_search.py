@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbf_abstract.geometry.arithmetic import norm
-from mbf_mesh_nav.arrays import FlagArray, Float32Array, FloatArray, IntArray
+from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.corners import build_corner_ends, write_corner_weights
 from mbf_mesh_nav.kernels.wave.cvp import ALONG_EDGE, propagate_wave
 from mbf_mesh_nav.kernels.wave.descent import Field, trace_descent
@@ -56,10 +56,11 @@ class Wave:
 
 
 class _Weights(NamedTuple):
-    """Weights of corner records at one version of the map, and the typical weight [m] of an edge."""
+    """Weights of corner records at one version of the map, what is obtuse, and the typical weight [m] of an edge."""
 
     version: int
     of_corners: Float32Array
+    obtuse_around: BoolArray
     step: float
 
 
@@ -183,29 +184,17 @@ class WaveSearch:
 
     def _propagated(self, query: LegQuery, targets: IntArray, overshoot: float, along_edges: bool) -> Wave | None:
         """Run the kernel from the goal of a query; None if cancelled."""
-        mesh_map = self._mesh_map
-        weights = self._take_weights(query)
+        mesh_map, weights = self._mesh_map, self._take_weights(query)
         if weights is None:
             return None
         distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal, query.snapshot)
         cut_records = np.full(len(distances), ALONG_EDGE, dtype=np.int32)
         bends = np.full(len(distances), NO_BEND, dtype=np.int32)
+        records = self._corner_ends.reshape(-1), weights.of_corners.reshape(-1), weights.obtuse_around
         settled = propagate_wave(
-            mesh_map.vertex_face_offsets,
-            self._corner_ends,
-            weights.of_corners,
-            query.blocked,
-            distances,
-            predecessors,
-            cut_records,
-            bends,
-            seeds,
-            targets,
-            overshoot,
-            weights.step,
-            query.cancel_flag,
-            along_edges,
-        )
+            mesh_map.vertex_face_offsets, *records, query.blocked, distances, predecessors, cut_records, bends,
+            seeds, targets, overshoot, weights.step, query.cancel_flag, along_edges,
+        )  # fmt: skip
         self._weights = weights
         return None if settled < 0 else Wave(distances, predecessors, cut_records, bends, along_edges)
 
@@ -222,17 +211,18 @@ class WaveSearch:
         changed = self._mesh_map.changes_between(weights.version, query.snapshot.version)
         if changed is None:
             return self._gathered(query.snapshot, query.cancel_flag)
-        return self._written(query.snapshot, changed, weights.of_corners, query.cancel_flag)
+        return self._written(query.snapshot, changed, weights, query.cancel_flag)
 
     def _gathered(self, snapshot: MeshSnapshot, cancel_flag: FlagArray) -> _Weights | None:
-        of_corners = np.empty((len(self._corner_ends), 3), dtype=np.float32)
         everything = np.arange(len(snapshot.costs), dtype=np.int32)
-        return self._written(snapshot, everything, of_corners, cancel_flag)
+        of_corners = np.empty((len(self._corner_ends), 3), dtype=np.float32)
+        weights = _Weights(-1, of_corners, np.empty(len(everything), dtype=np.bool_), 0.0)
+        return self._written(snapshot, everything, weights, cancel_flag)
 
     def _written(
-        self, snapshot: MeshSnapshot, changed: IntArray, of_corners: Float32Array, cancel_flag: FlagArray
+        self, snapshot: MeshSnapshot, changed: IntArray, weights: _Weights, cancel_flag: FlagArray
     ) -> _Weights | None:
-        """Bring weights (3F, 3) up to date at the changed vertices."""
+        """Bring weights up to date at the changed vertices, in place."""
         mesh_map = self._mesh_map
         finished = write_corner_weights(
             mesh_map.vertex_face_offsets,
@@ -241,10 +231,11 @@ class WaveSearch:
             mesh_map.neighbours,
             snapshot.edge_weights,
             changed,
-            of_corners,
+            weights.of_corners,
+            weights.obtuse_around,
             cancel_flag,
         )
         sample = snapshot.edge_weights[::STEP_SAMPLE]
         sample = sample[np.isfinite(sample)]
         step = float(sample.mean()) if len(sample) else mesh_map.topology.mean_edge_length
-        return _Weights(snapshot.version, of_corners, step) if finished else None
+        return weights._replace(version=snapshot.version, step=step) if finished else None

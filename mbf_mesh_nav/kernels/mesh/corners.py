@@ -2,17 +2,25 @@
 
 A wave that unfolds triangles needs them at each incident face of a vertex. Written one after the other they are 20
 bytes a record, and the wave never searches for a face or an edge. The ends depend on the mesh alone; the weights
-follow the map's costs, at the price of what changed.
+follow the map's costs, at the price of what changed. So does what else a wave asks of them: where corners are obtuse.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from mbf_mesh_nav.arrays import FlagArray, Float32Array, IntArray
+from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
+
+ENDS: Any = Index(2)
+WEIGHTS: Any = Index(3)
+"""Numbers of a record in its arrays without a second dimension."""
+TWO: Any = Index(2)
+OBTUSE: Any = np.float32(1.2)  # least ratio of the longest side squared to the others squared: 102 degrees if equal
 
 
 @kernel
@@ -38,12 +46,14 @@ def write_corner_weights(
     edge_weights: Float32Array,
     changed: IntArray,
     corner_weights: Float32Array,
+    obtuse_around: BoolArray,
     cancel_flag: FlagArray,
 ) -> bool:
     """Write the weights of all records that have an edge at one of the ``changed`` vertices (c,).
 
     A record's weights (3F, 3) are those of its edges to the first and to the second other corner, and between these.
-    ``cancel_flag`` (1,) is polled; returns False if it ended the call, and the weights are good for nothing then.
+    ``obtuse_around`` (V,) says whether one of the records of a vertex has an obtuse corner opposite to one of its own
+    edges. ``cancel_flag`` (1,) is polled; returns False if it ended the call, and both are good for nothing then.
     """
     is_written = np.empty(len(neighbour_offsets), dtype=np.bool_)
     fill(is_written, Count(0))
@@ -56,13 +66,23 @@ def write_corner_weights(
             vertex = Index(neighbours[slot]) if slot < Index(neighbour_offsets[center + ONE]) else center
             if is_written[vertex]:
                 continue
-            is_written[vertex] = True
+            is_written[vertex], any_obtuse = True, False
             for record in range(Index(vertex_face_offsets[vertex]), Index(vertex_face_offsets[vertex + ONE])):
                 first, second = Index(corner_ends[record, 0]), Index(corner_ends[record, 1])
-                corner_weights[record, 0] = edge_weights[slot_of(neighbour_offsets, neighbours, vertex, first)]
-                corner_weights[record, 1] = edge_weights[slot_of(neighbour_offsets, neighbours, vertex, second)]
-                corner_weights[record, 2] = edge_weights[slot_of(neighbour_offsets, neighbours, first, second)]
+                to_first = edge_weights[slot_of(neighbour_offsets, neighbours, vertex, first)]
+                to_second = edge_weights[slot_of(neighbour_offsets, neighbours, vertex, second)]
+                between = edge_weights[slot_of(neighbour_offsets, neighbours, first, second)]
+                corner_weights[record, 0], corner_weights[record, 1] = to_first, to_second
+                corner_weights[record, 2] = between
+                any_obtuse |= is_obtuse(max(to_first, to_second), min(to_first, to_second), between)
+            obtuse_around[vertex] = any_obtuse
     return True
+
+
+@inner_kernel
+def is_obtuse(c: float, b: float, a: float) -> bool:
+    """Whether the corner opposite to side ``c`` is so obtuse that a front may come through that side from afar."""
+    return bool(c * c > OBTUSE * (b * b + a * a))
 
 
 @inner_kernel

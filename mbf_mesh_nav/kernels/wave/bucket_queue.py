@@ -89,11 +89,13 @@ def next_bucket(
         waiting = heads[Index(bucket) & BUCKET_MASK]
         heads[Index(bucket) & BUCKET_MASK] = EMPTY
         while waiting != EMPTY:
-            following, place = links[waiting], Count(key_of(entries[waiting]) * inverse_width)
+            number = Index(waiting)
+            entry, following = entries[number], links[number]
+            place = Count(key_of(entry) * inverse_width)
             if place <= bucket:
-                near_size = _push(near, near_size, entries[waiting])
+                near_size = _push(near, near_size, entry)
             else:  # too far ahead when it was put in
-                _link(heads, links, Index(waiting), min(place, bucket + RING - 1))
+                _link(heads, links, number, min(place, bucket + RING - 1))
                 is_more_ahead = True
             waiting = following
     if near_size == Index(0) and is_more_ahead:  # a whole round and nothing was due

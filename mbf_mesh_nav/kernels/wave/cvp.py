@@ -27,12 +27,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inlined_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, kernel
 from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.lowest_bit import BITS, lowest_bit
+from mbf_mesh_nav.kernels.mesh.corners import ENDS, TWO, WEIGHTS, is_obtuse
 from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 from mbf_mesh_nav.kernels.wave.bucket_queue import (
@@ -46,13 +46,21 @@ from mbf_mesh_nav.kernels.wave.bucket_queue import (
     put,
     remove_least,
 )
-from mbf_mesh_nav.kernels.wave.fronts import NO_BEND, distance_where_fronts_meet, is_obtuse, unfolded_distance
+from mbf_mesh_nav.kernels.wave.due_faces import (
+    ALL_SETTLED,
+    ALONG_EDGES,
+    FREE,
+    ONE_FREE,
+    SETTLED,
+    THROUGH_FACES,
+    THROUGH_SETTLED,
+    due_faces,
+)
+from mbf_mesh_nav.kernels.wave.fronts import NO_BEND, distance_where_fronts_meet, unfolded_distance
 
 ALONG_EDGE = -1
-LARGE = 50_000  # vertices; of smaller meshes the caches hold all
+LARGE = 4_000  # vertices; of smaller meshes the nearest caches hold all
 LAST: Any = Index(5)  # of the records of most vertices, which are six; asking for what lies behind the end does no harm
-_FREE, _SETTLED = 0, 3
-_ONE_FREE, _ALL_SETTLED = 3, 6  # sums of the states of the two other corners; no other pairs have them
 _ZERO: Any = np.float32(0)
 NEAR_STEPS: Any = np.float32(10)  # typical edges from the source up to which all corners are asked for two fronts
 _INFINITE: Any = np.float32(np.inf)
@@ -63,6 +71,7 @@ def propagate_wave(
     vertex_face_offsets: IntArray,
     corner_ends: IntArray,
     corner_weights: Float32Array,
+    obtuse_around: BoolArray,
     blocked: BoolArray,
     distances: Float32Array,
     predecessors: IntArray,
@@ -79,8 +88,11 @@ def propagate_wave(
 
     Parameters
     ----------
-    vertex_face_offsets, corner_ends, corner_weights : (V+1,) int32, (3F, 2) int32, (3F, 3) float32
-        Faces around a vertex as corner records with weights [m], see ``corners.py``.
+    vertex_face_offsets, corner_ends, corner_weights : (V+1,) int32, (6F,) int32, (9F,) float32
+        Faces around a vertex as corner records with weights [m], see ``corners.py``, one after the other: an array
+        with two dimensions costs a multiplication more.
+    obtuse_around : (V,) bool
+        Whether a face around a vertex has an obtuse corner elsewhere, see ``corners.write_corner_weights``.
     blocked : (V,) bool
         Vertices never entered.
     distances : (V,) float32
@@ -110,8 +122,8 @@ def propagate_wave(
         Number of settled vertices, -1 if cancelled.
     """
     # 1. The queue (see ``bucket_queue.py``). A record adds one entry, three with edges; what is taken again none.
-    state = blocked.astype(np.uint8)  # _FREE, or 1 where it is blocked
-    room = (3 if along_edges else 1) * len(corner_ends) + len(seeds)
+    state = blocked.astype(np.uint8)  # FREE, or 1 where it is blocked
+    room = (3 if along_edges else 1) * (len(corner_ends) >> 1) + len(seeds)
     heads, links = np.empty(RING, dtype=np.int32), np.empty(room, dtype=np.int32)
     fill(heads, Count(EMPTY))
     entries, near = np.empty(room, dtype=np.uint64), np.empty(room, dtype=np.uint64)
@@ -120,8 +132,10 @@ def propagate_wave(
     for seed in seeds:
         entry = entry_of(distances[seed], Index(seed))
         used, near_size = put(heads, links, entries, near, used, near_size, bucket, inverse_width, entry)
-        state[seed] = _SETTLED  # their distances are exact from the start
-    limit, is_large, pops, targets_settled = np.float32(np.inf), len(distances) > LARGE, 0, 0
+        state[seed] = SETTLED  # their distances are exact from the start
+    going_on = ALONG_EDGES if along_edges else THROUGH_FACES
+    limit, is_large, pops = np.float32(np.inf), len(distances) > LARGE, 0
+    targets_settled, awaited = Index(0), Index(len(distances))  # the first target that is not settled; none known yet
     while True:
         # 2. The vertex with the least distance is settled; entries from before it was lowered are dropped.
         if near_size == Index(0):
@@ -134,29 +148,35 @@ def propagate_wave(
             continue
         if pops % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
             return -1
-        state[vertex] = _SETTLED
+        state[vertex] = SETTLED
         pops += 1
-        while targets_settled < len(targets) and state[targets[targets_settled]] == _SETTLED:
-            targets_settled += 1
-            if targets_settled == len(targets):
-                limit = np.float32(distances[vertex] + overshoot)
+        if vertex == awaited or pops == 1:
+            while targets_settled < Index(len(targets)) and state[Index(targets[targets_settled])] == SETTLED:
+                targets_settled += ONE
+                if targets_settled == Index(len(targets)):
+                    limit = np.float32(distances[vertex] + overshoot)
+            if targets_settled < Index(len(targets)):
+                awaited = Index(targets[targets_settled])
         # 3. Faces around it with one free corner propagate the wave; so do those with an obtuse corner, once more.
         u1, own_bend = key, bends[vertex]
-        to_own_bend = distances[own_bend] if own_bend != NO_BEND else _ZERO
+        to_own_bend = distances[Index(own_bend)] if own_bend != NO_BEND else _ZERO
         begin, end = Index(vertex_face_offsets[vertex]), Index(vertex_face_offsets[vertex + ONE])
         while begin < end:
             chunk, begin = begin, min(begin + BITS, end)
-            due = _due_faces(corner_ends, corner_weights, state, chunk, begin, along_edges)
+            sums = going_on | THROUGH_SETTLED if obtuse_around[vertex] else going_on
+            due = due_faces(corner_ends, state, chunk, begin, sums)
             while due != 0:
                 record = chunk + lowest_bit(due)
                 due &= due - ONE
-                first, second = Index(corner_ends[record, 0]), Index(corner_ends[record, 1])
-                to_first, to_second = corner_weights[record, 0], corner_weights[record, 1]
-                between, states = corner_weights[record, 2], state[first] + state[second]
-                if states < _ONE_FREE:
+                ends, weights = record * ENDS, record * WEIGHTS
+                first, second = Index(corner_ends[ends]), Index(corner_ends[ends + ONE])
+                to_first, to_second = corner_weights[weights], corner_weights[weights + ONE]
+                between, states = corner_weights[weights + TWO], state[first] + state[second]
+                if states < ONE_FREE:
                     for side in range(2):
-                        other, distance = Index(corner_ends[record, side]), key + corner_weights[record, side]
-                        if state[other] == _FREE and distance < distances[other]:
+                        other = first if side == 0 else second
+                        distance = key + (to_first if side == 0 else to_second)
+                        if state[other] == FREE and distance < distances[other]:
                             distances[other], predecessors[other] = distance, vertex
                             cut_records[other], bends[other] = ALONG_EDGE, vertex
                             entry = entry_of(distances[other], other)
@@ -165,9 +185,11 @@ def propagate_wave(
                             )
                     continue
                 # An obtuse corner lies opposite to the longest side.
-                is_second = (state[first] == _FREE) | ((states == _ALL_SETTLED) & (to_second > to_first))
+                is_second = (state[first] == FREE) | ((states == ALL_SETTLED) & (to_second > to_first))
                 known, free = (second, first) if is_second else (first, second)
                 to_known, to_free = (to_second, to_first) if is_second else (to_first, to_second)
+                if states == ALL_SETTLED and not is_obtuse(to_known, to_free, between):
+                    continue
                 u2, bend = distances[known], bends[known]
                 if u2 + to_known < u1 and predecessors[vertex] >= 0:
                     # No face had two known corners to bring the path along this side: the vertex is taken once more.
@@ -189,7 +211,7 @@ def propagate_wave(
                         vertex_face_offsets, corner_ends, corner_weights, distances, bends, vertex, known, free,
                         to_free, between, distance,
                     )  # fmt: skip
-                is_seed = states == _ALL_SETTLED and predecessors[free] < 0
+                is_seed = states == ALL_SETTLED and predecessors[free] < 0
                 if is_seed or not distance < distances[free]:
                     continue
                 nearer = vertex if side == 1 or (side == 0 and u1 < u2) else known
@@ -198,41 +220,15 @@ def propagate_wave(
                     if distance >= distances[free]:
                         continue
                 distances[free] = distance
-                bends[free] = last_bend if side == 0 else (vertex if side == 1 else known)
+                bends[free] = last_bend if side == 0 else Count(nearer)
                 predecessors[free] = nearer
-                cut_records[free] = record if side == 0 else ALONG_EDGE
-                if state[free] == _FREE:
+                cut_records[free] = Count(record) if side == 0 else Count(ALONG_EDGE)
+                if state[free] == FREE:
                     if is_large:  # its faces come from memory while it waits
                         ahead = Index(vertex_face_offsets[free])
-                        prefetch(corner_ends, ahead)
-                        prefetch(corner_ends, ahead + LAST)
-                        prefetch(corner_weights, ahead)
-                        prefetch(corner_weights, ahead + LAST)
+                        prefetch(corner_ends, ahead * ENDS)
+                        prefetch(corner_ends, (ahead + LAST) * ENDS)
+                        prefetch(corner_weights, ahead * WEIGHTS)
+                        prefetch(corner_weights, (ahead + LAST) * WEIGHTS)
                     entry = entry_of(np.float32(distance), free)
                     used, near_size = put(heads, links, entries, near, used, near_size, bucket, inverse_width, entry)
-
-
-@inlined_kernel
-def _due_faces(
-    corner_ends: IntArray,
-    corner_weights: Float32Array,
-    state: NDArray[np.uint8],
-    begin: int,
-    end: int,
-    along_edges: bool,
-) -> int:
-    """The records from ``begin`` to before ``end`` through which a wave goes on, as bits.
-
-    Those with one free corner; of those with none the obtuse ones; along edges also those with two. A third of the
-    records are, and nobody knows which, so this is without branches.
-    """
-    due, bit = Index(0), ONE
-    for record in range(begin, end):
-        states = state[Index(corner_ends[record, 0])] + state[Index(corner_ends[record, 1])]
-        to_first, to_second = corner_weights[record, 0], corner_weights[record, 1]
-        longer, shorter = max(to_first, to_second), min(to_first, to_second)
-        gains_again = (states == _ALL_SETTLED) & is_obtuse(longer, shorter, corner_weights[record, 2])
-        is_due = (states == _ONE_FREE) | gains_again | (along_edges & (states < _ONE_FREE))
-        due |= bit if is_due else Index(0)
-        bit += bit  # a shift by the record's number would be turned into vectors, which costs more with six records
-    return due  # type: ignore[no-any-return]

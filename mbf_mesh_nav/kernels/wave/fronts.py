@@ -19,11 +19,11 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, plain_kernel
+from mbf_mesh_nav.kernels.mesh.corners import ENDS, TWO, WEIGHTS
 
 NO_BEND = -1
 """The path comes straight from the source."""
 NOBODY = -1
-OBTUSE: Any = np.float32(1.2)  # least ratio of the longest side squared to the others squared: 102 degrees if equal
 MISMATCH: Any = np.float32(0.1)  # of a side: by how much later than predicted a front may reach the corner behind
 SLACK: Any = np.float32(1.001)
 PASSING: Any = np.float32(0.3)  # of a side: how far past the corner behind it a front may go that reached that corner
@@ -31,12 +31,6 @@ GRAZING: Any = np.float32(0.001)  # of a side: the same if the other path bends 
 _ZERO: Any = np.float32(0)
 _HALF: Any = np.float32(0.5)
 _INFINITE: Any = np.float32(np.inf)
-
-
-@inner_kernel
-def is_obtuse(c: float, b: float, a: float) -> bool:
-    """Whether the corner opposite to side ``c`` is so obtuse that the front may come through that side from afar."""
-    return bool(c * c > OBTUSE * (b * b + a * a))
 
 
 @inner_kernel
@@ -87,8 +81,10 @@ def corner_behind(
 ) -> tuple[int, float, float, float]:
     """Return the corner behind the side from ``vertex`` to ``known``, that side, and the sides from there to both."""
     for record in range(Index(offsets[vertex]), Index(offsets[vertex + ONE])):
-        first, second = Index(corner_ends[record, 0]), Index(corner_ends[record, 1])
-        to_first, to_second, between = corner_weights[record, 0], corner_weights[record, 1], corner_weights[record, 2]
+        ends, weights = record * ENDS, record * WEIGHTS
+        first, second = Index(corner_ends[ends]), Index(corner_ends[ends + ONE])
+        to_first, to_second = corner_weights[weights], corner_weights[weights + ONE]
+        between = corner_weights[weights + TWO]
         if first == known and second != free:
             return Count(second), to_first, to_second, between
         if second == known and first != free:

@@ -23,10 +23,10 @@ def wave_from_vertex(mesh_map, source, weights=None, blocked=None, step=0.5):
     count = len(mesh_map.vertices)
     ends = build_corner_ends(mesh_map.faces, mesh_map.vertex_face_offsets, mesh_map.vertex_faces)
     weights = mesh_map.neighbour_lengths if weights is None else weights
-    corner_weights = np.empty((len(ends), 3), np.float32)
+    corner_weights, obtuse_around = np.empty((len(ends), 3), np.float32), np.empty(count, bool)
     write_corner_weights(
         mesh_map.vertex_face_offsets, ends, mesh_map.neighbour_offsets, mesh_map.neighbours, weights,
-        np.arange(count, dtype=np.int32), corner_weights, np.zeros(1, np.uint8),
+        np.arange(count, dtype=np.int32), corner_weights, obtuse_around, np.zeros(1, np.uint8),
     )  # fmt: skip
     blocked = np.zeros(count, bool) if blocked is None else blocked
     distances, predecessors = np.full(count, np.inf, np.float32), np.full(count, -1, np.int32)
@@ -34,7 +34,7 @@ def wave_from_vertex(mesh_map, source, weights=None, blocked=None, step=0.5):
     seeds = np.concatenate([[source], ring]).astype(np.int32)
     distances[seeds] = np.linalg.norm(mesh_map.vertices[seeds] - mesh_map.vertices[source], axis=1)
     propagate_wave(
-        mesh_map.vertex_face_offsets, ends, corner_weights, blocked,
+        mesh_map.vertex_face_offsets, ends.reshape(-1), corner_weights.reshape(-1), obtuse_around, blocked,
         distances, predecessors, np.full(count, -1, np.int32), np.full(count, -1, np.int32), seeds,
         np.zeros(0, np.int32), 0.3,
         step, np.zeros(1, np.uint8),
