@@ -12,14 +12,16 @@ from typing import Any
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inlined_kernel, inner_kernel, kernel
 from mbf_mesh_nav.kernels.fill import fill
+from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 
 ENDS: Any = Index(2)
 WEIGHTS: Any = Index(3)
 """Numbers of a record in its arrays without a second dimension."""
 TWO: Any = Index(2)
+_LAST: Any = Index(5)  # of most vertices, which have six; asking for what lies behind the end does no harm
 OBTUSE: Any = np.float32(1.2)  # least ratio of the longest side squared to the others squared: 102 degrees if equal
 
 
@@ -83,6 +85,15 @@ def write_corner_weights(
 def is_obtuse(c: float, b: float, a: float) -> bool:
     """Whether the corner opposite to side ``c`` is so obtuse that a front may come through that side from afar."""
     return bool(c * c > OBTUSE * (b * b + a * a))
+
+
+@inlined_kernel
+def prefetch_records(corner_ends: IntArray, corner_weights: Float32Array, first: int) -> None:
+    """Ask for the records (6F,), (9F,) of a vertex, of which ``first`` is the first, before they are needed."""
+    prefetch(corner_ends, first * ENDS)
+    prefetch(corner_ends, (first + _LAST) * ENDS)
+    prefetch(corner_weights, first * WEIGHTS)
+    prefetch(corner_weights, (first + _LAST) * WEIGHTS)
 
 
 @inner_kernel

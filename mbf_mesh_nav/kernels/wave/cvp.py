@@ -32,8 +32,7 @@ from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, kernel
 from mbf_mesh_nav.kernels.fill import fill
 from mbf_mesh_nav.kernels.lowest_bit import BITS, lowest_bit
-from mbf_mesh_nav.kernels.mesh.corners import ENDS, TWO, WEIGHTS, is_obtuse
-from mbf_mesh_nav.kernels.prefetch import prefetch
+from mbf_mesh_nav.kernels.mesh.corners import ENDS, TWO, WEIGHTS, is_obtuse, prefetch_records
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 from mbf_mesh_nav.kernels.wave.bucket_queue import (
     BUCKETS_PER_STEP,
@@ -60,7 +59,6 @@ from mbf_mesh_nav.kernels.wave.fronts import NO_BEND, distance_where_fronts_meet
 
 ALONG_EDGE = -1
 LARGE = 4_000  # vertices; of smaller meshes the nearest caches hold all
-LAST: Any = Index(5)  # of the records of most vertices, which are six; asking for what lies behind the end does no harm
 _ZERO: Any = np.float32(0)
 NEAR_STEPS: Any = np.float32(10)  # typical edges from the source up to which all corners are asked for two fronts
 _INFINITE: Any = np.float32(np.inf)
@@ -134,8 +132,8 @@ def propagate_wave(
         used, near_size = put(heads, links, entries, near, used, near_size, bucket, inverse_width, entry)
         state[seed] = SETTLED  # their distances are exact from the start
     going_on = ALONG_EDGES if along_edges else THROUGH_FACES
-    limit, is_large, pops = np.float32(np.inf), len(distances) > LARGE, 0
-    targets_settled, awaited = Index(0), Index(len(distances))  # the first target that is not settled; none known yet
+    limit, is_large, pops, targets_settled = np.float32(np.inf), len(distances) > LARGE, 0, Index(0)
+    nobody = awaited = Index(len(distances))  # the first target that is not settled; not known yet
     while True:
         # 2. The vertex with the least distance is settled; entries from before it was lowered are dropped.
         if near_size == Index(0):
@@ -153,29 +151,24 @@ def propagate_wave(
         if vertex == awaited or pops == 1:
             while targets_settled < Index(len(targets)) and state[Index(targets[targets_settled])] == SETTLED:
                 targets_settled += ONE
-                if targets_settled == Index(len(targets)):
-                    limit = np.float32(distances[vertex] + overshoot)
-            if targets_settled < Index(len(targets)):
-                awaited = Index(targets[targets_settled])
+                limit = np.float32(distances[vertex] + overshoot) if targets_settled == Index(len(targets)) else limit
+            awaited = Index(targets[targets_settled]) if targets_settled < Index(len(targets)) else nobody
         # 3. Faces around it with one free corner propagate the wave; so do those with an obtuse corner, once more.
-        u1, own_bend = key, bends[vertex]
+        u1, own_bend, sums = key, bends[vertex], going_on | THROUGH_SETTLED if obtuse_around[vertex] else going_on
         to_own_bend = distances[Index(own_bend)] if own_bend != NO_BEND else _ZERO
         begin, end = Index(vertex_face_offsets[vertex]), Index(vertex_face_offsets[vertex + ONE])
         while begin < end:
             chunk, begin = begin, min(begin + BITS, end)
-            sums = going_on | THROUGH_SETTLED if obtuse_around[vertex] else going_on
             due = due_faces(corner_ends, state, chunk, begin, sums)
             while due != 0:
                 record = chunk + lowest_bit(due)
                 due &= due - ONE
-                ends, weights = record * ENDS, record * WEIGHTS
-                first, second = Index(corner_ends[ends]), Index(corner_ends[ends + ONE])
-                to_first, to_second = corner_weights[weights], corner_weights[weights + ONE]
-                between, states = corner_weights[weights + TWO], state[first] + state[second]
+                first, second = Index(corner_ends[record * ENDS]), Index(corner_ends[record * ENDS + ONE])
+                to_first, to_second = corner_weights[record * WEIGHTS], corner_weights[record * WEIGHTS + ONE]
+                between, states = corner_weights[record * WEIGHTS + TWO], state[first] + state[second]
                 if states < ONE_FREE:
                     for side in range(2):
-                        other = first if side == 0 else second
-                        distance = key + (to_first if side == 0 else to_second)
+                        other, distance = (first, key + to_first) if side == 0 else (second, key + to_second)
                         if state[other] == FREE and distance < distances[other]:
                             distances[other], predecessors[other] = distance, vertex
                             cut_records[other], bends[other] = ALONG_EDGE, vertex
@@ -211,9 +204,8 @@ def propagate_wave(
                         vertex_face_offsets, corner_ends, corner_weights, distances, bends, vertex, known, free,
                         to_free, between, distance,
                     )  # fmt: skip
-                is_seed = states == ALL_SETTLED and predecessors[free] < 0
-                if is_seed or not distance < distances[free]:
-                    continue
+                if (states == ALL_SETTLED and predecessors[free] < 0) or not distance < distances[free]:
+                    continue  # a seed, or no gain
                 nearer = vertex if side == 1 or (side == 0 and u1 < u2) else known
                 if distance <= distances[nearer]:  # an obtuse corner close behind its long side
                     distance = np.nextafter(distances[nearer], _INFINITE)
@@ -225,10 +217,6 @@ def propagate_wave(
                 cut_records[free] = Count(record) if side == 0 else Count(ALONG_EDGE)
                 if state[free] == FREE:
                     if is_large:  # its faces come from memory while it waits
-                        ahead = Index(vertex_face_offsets[free])
-                        prefetch(corner_ends, ahead * ENDS)
-                        prefetch(corner_ends, (ahead + LAST) * ENDS)
-                        prefetch(corner_weights, ahead * WEIGHTS)
-                        prefetch(corner_weights, (ahead + LAST) * WEIGHTS)
+                        prefetch_records(corner_ends, corner_weights, Index(vertex_face_offsets[free]))
                     entry = entry_of(np.float32(distance), free)
                     used, near_size = put(heads, links, entries, near, used, near_size, bucket, inverse_width, entry)
