@@ -117,9 +117,18 @@ def _sources(*folders: Path) -> str:
     """Digest of all Python files of folders and those below them: the kernels, and how they are compiled."""
     digest = hashlib.sha256()
     for folder in folders:
-        for file in sorted(folder.rglob("*.py")):
+        for file in _python_files(folder):
             digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
+
+
+def _python_files(folder: Path) -> list[Path]:
+    """Files of Python in a folder and below, but for caches: another process may be removing its old one of them."""
+    found: list[Path] = []
+    for place, folders, files in os.walk(folder):
+        folders[:] = [name for name in folders if name != "__pycache__"]
+        found += [Path(place, name) for name in files if name.endswith(".py")]
+    return sorted(found)
 
 
 @lru_cache

@@ -83,6 +83,18 @@ def test_two_first_runs_at_once_both_come_out_right_and_leave_a_cache_that_is_us
     assert call_in_a_process_of_its_own(tmp_path) == (20, 1)
 
 
+def test_the_sources_are_read_without_a_look_into_caches_which_another_process_may_be_removing(tmp_path):
+    (tmp_path / "search.py").write_text(SEARCH)
+    before = kernel_cache._sources(tmp_path)
+    cached = tmp_path / "__pycache__" / "kernels-of-before" / "states"
+    cached.mkdir(parents=True)
+    (cached / "step.py").write_text(STEP.format(1))
+    assert kernel_cache._sources(tmp_path) == before
+    (tmp_path / "steps").mkdir()
+    (tmp_path / "steps" / "step.py").write_text(STEP.format(1))
+    assert kernel_cache._sources(tmp_path) != before
+
+
 def test_the_code_of_earlier_sources_is_removed_and_that_of_todays_is_kept_beside_them(tmp_path):
     kernels = tmp_path / "kernels"
     kernels.mkdir()
