@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from mbf_abstract.compiling.sources import source_files
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.parameters import ParameterModel, parameter
@@ -73,11 +74,9 @@ def place_of(package: str) -> Path | None:
 def hash_of_code(place: Path) -> str:
     """SHA-256 of a module's file, or of all files of a package but caches and hidden ones, with their names."""
     digest = hashlib.sha256()
-    for file in [place] if place.is_file() else sorted(place.rglob("*")):
-        parts = file.relative_to(place.parent).parts
-        if file.is_file() and not any(part.startswith(".") or part == "__pycache__" for part in parts):
-            content = file.read_bytes()
-            digest.update(f"{'/'.join(parts)}\n{len(content)}\n".encode() + content)
+    for file in [place] if place.is_file() else source_files(place):
+        content = file.read_bytes()
+        digest.update(f"{file.relative_to(place.parent).as_posix()}\n{len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 
