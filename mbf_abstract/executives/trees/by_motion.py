@@ -23,6 +23,11 @@ LONGEST_PASSING = 3.0
 """So far [m] from where a detour was taken the robot still passes who stands there."""
 MEETING = 6.0
 """Who was seen to move and has stood for so long [s] before a robot that creeps does not go on before that one."""
+TOGETHER, FACING = 2.5, 3.0
+"""Who came along the path, and had stood for no longer than the first [s] when the robot was seen to creep, stopped for
+the robot; after the second [s] it does not go on before the robot."""
+SAME_STOP = 0.5
+"""Two estimates [s] of when somebody stopped that are this near are of one stop."""
 ALONG = 0.7
 """From this cosine on between the path and its way somebody goes along the path."""
 
@@ -117,15 +122,26 @@ class EndDrive(Leaf):
         super().__init__(name)
         self.patience = patience
         self.length = length
+        self._met = (0, 0.0)  # number of the last one, and when [s] it stopped
+        self._together = False  # whether the robot was seen to creep soon after that
 
     def update(self) -> Status:
         """Ask who it is, and for how long it stands."""
         first = first_in_the_way(self.mission, self.length, MARGIN)
-        if first is None or first.by.standing < self.patience or self._passes():
+        if first is None or first.by.standing < self._patience_with(first) or self._passes():
             return Status.FAILURE
         text = f"object {first.by.number} waits for the robot and has stood for {first.by.standing:.1f} s"
         self.mission.fail(ActionResult(int(ExePathOutcome.BLOCKED_PATH), text))
         return Status.SUCCESS
+
+    def _patience_with(self, first: Blockage) -> float:
+        """Less with one that came along the path and stopped when the robot crept already: it stopped for the robot."""
+        number, stopped = self._met
+        stops = self.mission.clock.now() - first.by.standing
+        if first.by.number != number or abs(stops - stopped) > SAME_STOP:
+            self._met, self._together = (first.by.number, stops), first.by.standing <= TOGETHER
+        stopped_for_robot = self._together and first.along <= -ALONG
+        return min(FACING, self.patience) if stopped_for_robot else self.patience
 
     def _passes(self) -> bool:
         """Whether the robot drives a detour that was taken near here."""

@@ -235,7 +235,8 @@ class GiveWayRecovery(PullingOutRecovery):
         """
         length, rivals = self.parameters.reach + self.parameters.distance, self.rivals()
         paths = [rival.points_ahead(length) for rival in self._before(rivals)]
-        own = in_plane_of(begin, course, paths_to_keep_free(course, self._track, paths, length))
+        own = paths_to_keep_free(course, self._track, paths, length)
         known = () if rivals else self.navigation_map.tracked_objects(self.clock.now())
         distance, same_storey = self.parameters.distance, self.navigation_map.same_storey
-        return paths_beside(self.on_map(begin), own, known, distance, same_storey)
+        free = paths_beside(self.on_map(course), own, known, distance, same_storey)
+        return (in_plane_of(begin, course, points) for points in free)

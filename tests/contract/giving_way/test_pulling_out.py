@@ -201,6 +201,24 @@ def test_what_it_drives_to_pull_out_is_no_path_that_it_keeps_free(give_way, worl
     assert motion.end.distance_to(stops[0]) < 0.3
 
 
+def test_the_way_of_who_is_tracked_ahead_stays_free_when_it_searches_anew(give_way, world):
+    """It has turned by then, and the way of the other one still leads along its path, not where it looks now."""
+    known, stops = world.map_of(bay(2.4, 5.4, True)), []
+    known.tracked_objects = lambda now: (tracked(5.6, 3.3),)
+    as_ever = known.obstacle_on_path
+
+    def obstacle_on_path(pose, command, duration):
+        if stops or abs(pose.yaw) < 0.8:
+            return as_ever(pose, command, duration)
+        stops.append(pose)
+        return "somebody passes"
+
+    known.obstacle_on_path = obstacle_on_path
+    result, motion = give_way(bay(2.4, 5.4, True), distance=0.6, navigation_map=known)
+    assert stops and result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert motion.end.y - 3.3 > 0.55
+
+
 def aisle(half_width):
     """A costmap of a corridor along y = 3, and an aisle off it ahead; the outline is 0.6 m long and 0.4 m wide."""
     x, y = np.meshgrid((np.arange(400) + 0.5) * 0.02, (np.arange(300) + 0.5) * 0.02)

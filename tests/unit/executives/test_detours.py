@@ -77,6 +77,23 @@ def test_before_one_that_came_along_the_path_and_stands_the_drive_ends(
     assert recoveries(session)[:1] == yields
 
 
+def test_one_that_stopped_when_the_robot_crept_already_stopped_for_it(make_session, recoveries, on_the_path):
+    """It came along the path; another one that stood before may only load, and gets 6 s."""
+    for first_seen, yields in ((2.0, ["back_up"]), (2.6, [])):
+        session, seen = make_session(), []
+
+        def what_blocks(path, margin, session=session, seen=seen, first_seen=first_seen):
+            seen.append(session.clock.now())
+            return (somebody(standing=first_seen + seen[-1] - seen[0], along=-1.0),)
+
+        on_the_path(session)
+        session.server.queries.what_blocks = what_blocks
+        creep(session, 70)
+        session.planner.play(straight_plan, NO_PATH)
+        assert run(session).success
+        assert recoveries(session)[:1] == yields
+
+
 @pytest.mark.parametrize(("along", "recovery"), [(-1.0, ["back_up"]), (1.0, ["relax"])], ids=["came", "went"])
 def test_before_one_that_came_along_the_path_giving_way_is_the_first_recovery(
     make_session, recoveries, on_the_path, along, recovery
