@@ -3,7 +3,8 @@
 When to use: a good global path that is to be followed as it is, at little computing time (under 0.2 ms a cycle, 0.3 ms
 while it turns at its goal). Forward-only, reversing and turn-in-place robots. When not: obstacles that are not in the
 path - it stops before them (BLOCKED_PATH) and never drives around; that needs replanning, ``costmap.dwa`` or
-``costmap.mppi``. It cuts corners by about look_ahead^2 / (8 * radius), which a car cannot always correct.
+``costmap.mppi``. It cuts corners by about look_ahead^2 / (8 * radius); cars, which cannot always correct that, keep to
+their path by ``control.close_steering``.
 Formula: pure pursuit (Coulter 1992), curvature = 2 y / L^2; the speeds are those of ``control.regulated_speed``.
 """
 
@@ -11,15 +12,14 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from mbf_abstract.execution.path_tracker import CUSP_REACHED
-from mbf_abstract.geometry import Path, Twist, normalize_angle
+from mbf_abstract.geometry import Path, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.continued_path import carried_over
 from mbf_abstract.maps.controllers.end_of_path import at_exact_end, swept_poses, turn_left
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_goal, obstacle_text
 from mbf_abstract.maps.controllers.room_to_turn import (
+    CREEPING,
     SMALL_TURN,
     RoomToTurn,
     along_path,
@@ -31,25 +31,24 @@ from mbf_abstract.maps.controllers.room_to_turn import (
     poses_ahead,
     wider_curves,
 )
-from mbf_abstract.maps.controllers.tight_places import CLOSE_FROM, CLOSELY, TightPlaces
+from mbf_abstract.maps.controllers.tight_places import AT_ONCE, CLOSE_FROM, CLOSELY, TightPlaces
 from mbf_abstract.maps.controllers.way_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
-from mbf_costmap_nav.control.path_geometry import look_ahead_point
-from mbf_costmap_nav.control.path_handling import ControlCycle, to_base_frame
-from mbf_costmap_nav.control.regulated_speed import RegulatedFollower
-from mbf_costmap_nav.grid.costmap import FREE
+from mbf_costmap_nav.control.close_steering import steer_closely
+from mbf_costmap_nav.control.path_handling import ControlCycle
+from mbf_costmap_nav.control.pursuit_steering import PursuitSteering
 
 LEADS_OUT = 0.3  # m; so far a robot that touches something looks whether the motion leads out
 SWEEP_STEP = 0.1  # cells; from pose to pose of a turn at the goal, which must look the same from every heading in it
 SLOWEST = 0.01  # m/s; slower commands are looked ahead for as long as this one, to bound the work
 
 
-class RegulatedPurePursuitController(LeavesContacts, RegulatedFollower):
+class RegulatedPurePursuitController(LeavesContacts, PursuitSteering):
     """Carrot follower with regulated speed."""
 
     leaves_contacts = True
-    _at_goal = False
+    _known_free: Twist | None = None
     _room_to_turn = RoomToTurn()
     _tight_places = TightPlaces()
 
@@ -93,12 +92,15 @@ class RegulatedPurePursuitController(LeavesContacts, RegulatedFollower):
         if (turn := self._turn_at_goal(cycle)) is not None:
             return at_exact_end(pose, cycle.tracker, backward, turn, lambda angle: self._turn(cycle, angle))
         carrot = self._carrot(cycle)
-        if close := self._closely(cycle, backward):
+        close = self._closely(cycle, backward)
+        if steered := self._steered(cycle, backward, is_tight=bool(close)):
+            return [steered]
+        if close:
             return close
         error = off_course(math.atan2(carrot[1], carrot[0]), backward)
         if self.rotates and abs(error) > self.parameters.rotate_to_heading_min_angle:
             return curves_ahead(self._turn(cycle, error), error, backward)
-        return wider_curves(self._drive(cycle, carrot, backward))
+        return wider_curves(self._drive(cycle, self._curvature_to(carrot), backward))
 
     def _closely(self, cycle: ControlCycle, backward: bool) -> list[Twist]:
         """Motions that creep along the path where a tight place is near ahead; none far from the path."""
@@ -118,11 +120,21 @@ class RegulatedPurePursuitController(LeavesContacts, RegulatedFollower):
             return [self._turn(cycle, angle_to_path(cycle.tracker, cycle.request.pose, backward))]
         return [self._slowed(motion, cycle.request.velocity) for motion in close]
 
-    def _slowed(self, motion: Twist, velocity: Twist) -> Twist:
-        """The same arc as slowly as the robot can drive it by now."""
-        change = self.parameters.acc_lim_x * self.parameters.control_period
-        speed = min(max(motion.vx, velocity.vx - change), velocity.vx + change)
-        return Twist.planar(speed, wz=motion.wz / motion.vx * speed)
+    def _steered(self, cycle: ControlCycle, backward: bool, *, is_tight: bool) -> Twist | None:
+        """The arc by which a car keeps best to its path, creeping in a tight place; None far from the path."""
+        self._known_free = None
+        if self.turning_radius == 0.0 or cycle.touches:
+            return None
+        tightest = self._drive(cycle, 1.0 / self.turning_radius, backward)
+        creeping = self._slowed(Twist.planar(-CREEPING if backward else CREEPING), cycle.request.velocity)
+        speed = creeping.vx if is_tight else tightest.vx
+        curvature = steer_closely(cycle, self.turning_radius, speed, self.parameters)
+        if curvature is None:
+            return None
+        assert self.tracker is not None
+        self.tracker.cusp_reached = AT_ONCE  # a curve that ends too early cannot be made up for
+        self._known_free = Twist.planar(speed, wz=abs(speed) * curvature)
+        return self._known_free
 
     def _along_path(self, cycle: ControlCycle) -> list[Twist]:
         """Motions that keep to the path before its end, if the outline fits on it as far as the farthest look-ahead."""
@@ -138,55 +150,6 @@ class RegulatedPurePursuitController(LeavesContacts, RegulatedFollower):
             return motions
         error = angle_to_path(cycle.tracker, pose, backward)
         return [*motions, self._turn(cycle, error)] if abs(error) > SMALL_TURN else motions
-
-    def _backward(self, cycle: ControlCycle) -> bool:
-        return self.parameters.allow_reversing and cycle.tracker.driving_backward
-
-    def _angle_left(self, cycle: ControlCycle) -> float:
-        """Angle [rad] to the carrot."""
-        carrot = self._carrot(cycle)
-        return off_course(math.atan2(carrot[1], carrot[0]), self._backward(cycle))
-
-    def _turn(self, cycle: ControlCycle, angle: float) -> Twist:
-        return Twist.planar(wz=self.rotation_speed(angle, cycle.request.velocity.wz))
-
-    # ------------------------------------------------------------------------------------------------ steering
-    def _carrot(self, cycle: ControlCycle) -> tuple[float, float]:
-        """Look-ahead point in the base frame; past a cusp it lies straight on."""
-        tracker, distance = cycle.tracker, self.look_ahead_distance(cycle.request.velocity.vx)
-        wanted = distance + tracker.deviation
-        points = tracker.ahead(min(wanted, tracker.to_cusp))
-        if wanted > tracker.to_cusp and not tracker.on_last_section:
-            points = np.vstack([points, tracker.straight_on(wanted)])
-        local = to_base_frame(points, cycle.request.pose)
-        x, y = look_ahead_point(local, distance)
-        return float(x), float(y)
-
-    def _turn_at_goal(self, cycle: ControlCycle) -> float | None:
-        """Angle to the goal's heading once the robot stands at the goal's position."""
-        if not self.rotates:
-            return None
-        goal, pose = cycle.tracker.goal, cycle.request.pose
-        # Once inside, twice the tolerance keeps the robot turning although it slides a little while it stops.
-        reach = self.goal_dist_tolerance * (2.0 if self._at_goal else 1.0)
-        near = math.hypot(goal.x - pose.x, goal.y - pose.y) <= reach
-        self._at_goal = near and cycle.tracker.has_arrived(reach)
-        return normalize_angle(goal.yaw - pose.yaw) if self._at_goal else None
-
-    def _drive(self, cycle: ControlCycle, carrot: tuple[float, float], backward: bool) -> Twist:
-        """Command along the arc through the carrot."""
-        p, velocity = self.parameters, cycle.request.velocity
-        curvature = 2.0 * carrot[1] / max(carrot[0] ** 2 + carrot[1] ** 2, 1e-6)
-        if self.turning_radius > 0.0:
-            curvature = min(max(curvature, -1.0 / self.turning_radius), 1.0 / self.turning_radius)
-        cost = cycle.costmap.cost_at(cycle.request.pose.x, cycle.request.pose.y) or FREE
-        regulated = min(self.regulated_speed(curvature, cost, cycle.tracker.to_cusp), cycle.speed_limit)
-        wanted = -regulated if backward else regulated
-        change = p.acc_lim_x * p.control_period
-        speed = min(max(wanted, velocity.vx - change), velocity.vx + change)
-        if abs(speed * curvature) > p.max_vel_theta:
-            speed = math.copysign(p.max_vel_theta / abs(curvature), speed)
-        return Twist.planar(vx=speed, wz=speed * curvature)
 
     # ----------------------------------------------------------------------------------------------- collisions
     def _checked(self, cycle: ControlCycle, motions: list[Twist]) -> ControlResult:
@@ -208,6 +171,8 @@ class RegulatedPurePursuitController(LeavesContacts, RegulatedFollower):
 
     def _blocked(self, cycle: ControlCycle, command: Twist) -> str:
         """Where a command leads into an obstacle in the check time, not beyond the next cusp; empty if free."""
+        if command is self._known_free:
+            return ""
         if command.vx == 0.0 and self.costmap.unpadded_footprint.is_circle:
             return ""  # whatever the polygon does that stands for it
         if self._at_goal and command.vx == 0.0:

@@ -36,6 +36,8 @@ HEADINGS = np.arange(16) * (math.pi / 8.0)
 """Where the outline fits with all of these [rad], the robot can turn."""
 CLOSELY = 0.02
 """So near [m] a robot that is driven closely comes to a cusp."""
+AT_ONCE = 0.005
+"""So near [m] a car comes to it that keeps to its path by more than an arc to a point ahead."""
 KEPT = 0.05
 """An answer holds until the robot has come so far [m] on its path."""
 
@@ -108,7 +110,7 @@ class TightPlaces:
         A stroke that is driven closely may end a few millimetres before a wall, too near for a robot that is a little
         beside its path. The last centimetres of the stroke are not needed.
         """
-        return tracker.cusp_reached == CLOSELY and tracker.begin_next_section()
+        return tracker.cusp_reached <= CLOSELY and tracker.begin_next_section()
 
 
 def _poses_at(tracker: PathTracker, lengths: FloatArray, reverses: bool) -> FloatArray:

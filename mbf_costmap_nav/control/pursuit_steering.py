@@ -1,0 +1,81 @@
+"""Where a regulated pure pursuit steers: the carrot, the arc through it, and turns on the spot.
+
+When to use: as the base of ``costmap.regulated_pure_pursuit``, which chooses between them and looks whether they are
+free. When not: controllers that sample motions.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbf_abstract.geometry import Twist, normalize_angle
+from mbf_abstract.maps.controllers.room_to_turn import off_course
+from mbf_costmap_nav.control.path_geometry import look_ahead_point
+from mbf_costmap_nav.control.path_handling import ControlCycle, to_base_frame
+from mbf_costmap_nav.control.regulated_speed import RegulatedFollower
+from mbf_costmap_nav.grid.costmap import FREE
+
+
+class PursuitSteering(RegulatedFollower):
+    """Steering to a carrot on the path."""
+
+    _at_goal = False
+
+    def _backward(self, cycle: ControlCycle) -> bool:
+        return self.parameters.allow_reversing and cycle.tracker.driving_backward
+
+    def _angle_left(self, cycle: ControlCycle) -> float:
+        """Angle [rad] to the carrot."""
+        carrot = self._carrot(cycle)
+        return off_course(math.atan2(carrot[1], carrot[0]), self._backward(cycle))
+
+    def _turn(self, cycle: ControlCycle, angle: float) -> Twist:
+        return Twist.planar(wz=self.rotation_speed(angle, cycle.request.velocity.wz))
+
+    def _slowed(self, motion: Twist, velocity: Twist) -> Twist:
+        """The same arc as slowly as the robot can drive it by now."""
+        change = self.parameters.acc_lim_x * self.parameters.control_period
+        speed = min(max(motion.vx, velocity.vx - change), velocity.vx + change)
+        return Twist.planar(speed, wz=motion.wz / motion.vx * speed)
+
+    def _carrot(self, cycle: ControlCycle) -> tuple[float, float]:
+        """Look-ahead point in the base frame; past a cusp it lies straight on."""
+        tracker, distance = cycle.tracker, self.look_ahead_distance(cycle.request.velocity.vx)
+        wanted = distance + tracker.deviation
+        points = tracker.ahead(min(wanted, tracker.to_cusp))
+        if wanted > tracker.to_cusp and not tracker.on_last_section:
+            points = np.vstack([points, tracker.straight_on(wanted)])
+        local = to_base_frame(points, cycle.request.pose)
+        x, y = look_ahead_point(local, distance)
+        return float(x), float(y)
+
+    def _turn_at_goal(self, cycle: ControlCycle) -> float | None:
+        """Angle to the goal's heading once the robot stands at the goal's position."""
+        if not self.rotates:
+            return None
+        goal, pose = cycle.tracker.goal, cycle.request.pose
+        # Once inside, twice the tolerance keeps the robot turning although it slides a little while it stops.
+        reach = self.goal_dist_tolerance * (2.0 if self._at_goal else 1.0)
+        near = math.hypot(goal.x - pose.x, goal.y - pose.y) <= reach
+        self._at_goal = near and cycle.tracker.has_arrived(reach)
+        return normalize_angle(goal.yaw - pose.yaw) if self._at_goal else None
+
+    def _curvature_to(self, carrot: tuple[float, float]) -> float:
+        """Of the arc [1/m] through the carrot, or the tightest."""
+        curvature = 2.0 * carrot[1] / max(carrot[0] ** 2 + carrot[1] ** 2, 1e-6)
+        tightest = 1.0 / self.turning_radius if self.turning_radius > 0.0 else math.inf
+        return min(max(curvature, -tightest), tightest)
+
+    def _drive(self, cycle: ControlCycle, curvature: float, backward: bool) -> Twist:
+        """Command along an arc."""
+        p, velocity = self.parameters, cycle.request.velocity
+        cost = cycle.costmap.cost_at(cycle.request.pose.x, cycle.request.pose.y) or FREE
+        regulated = min(self.regulated_speed(curvature, cost, cycle.tracker.to_cusp), cycle.speed_limit)
+        wanted = -regulated if backward else regulated
+        change = p.acc_lim_x * p.control_period
+        speed = min(max(wanted, velocity.vx - change), velocity.vx + change)
+        if abs(speed * curvature) > p.max_vel_theta:
+            speed = math.copysign(p.max_vel_theta / abs(curvature), speed)
+        return Twist.planar(vx=speed, wz=speed * curvature)
