@@ -76,9 +76,7 @@ def plan(
                 with waiting("drawing the picture"):
                     draw_plan(png, server, start_pose, goal_pose, result)
     if compiled.kernels:
-        what = "compiled once, kept on disk" if compiled.kept else "compiled, and not kept for the next time"
-        names = ", ".join(dict.fromkeys(compiled.kernels))  # some are compiled for several types
-        typer.echo(f"{what} ({compiled.seconds:.1f} s): {names}", err=True)
+        typer.echo(str(compiled), err=True)
     _report(result, seconds, notes, as_json)
     if not result.success:
         raise typer.Exit(FAILURE)

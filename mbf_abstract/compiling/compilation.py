@@ -41,6 +41,11 @@ class Compiled:
     seconds: float = 0.0
     kept: bool = True
 
+    def __str__(self) -> str:
+        count = len(set(self.kernels))  # some are compiled for several types
+        where = "once, kept on disk" if self.kept else "and not kept for the next time"
+        return f"kernels compiled {where}: {count} ({self.seconds:.1f} s)"
+
 
 _watchers = _Watchers()
 _listeners: list[tuple[Compiled, Callable[[str], None]]] = []

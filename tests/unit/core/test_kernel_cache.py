@@ -12,7 +12,7 @@ import numba
 import pytest
 
 from mbf_abstract.compiling import kernel_cache
-from mbf_abstract.compiling.compilation import record_compilations
+from mbf_abstract.compiling.compilation import Compiled, record_compilations
 from mbf_abstract.compiling.decorators import brief_kernel, kernel
 from mbf_abstract.compiling.garbage import NEW_OBJECTS
 from mbf_abstract.compiling.kernel_cache import compile_lazily
@@ -81,6 +81,12 @@ def test_two_first_runs_at_once_both_come_out_right_and_leave_a_cache_that_is_us
         results = [pool.submit(call_in_a_process_of_its_own, tmp_path) for _ in range(2)]
     assert [result.result()[0] for result in results] == [20, 20]
     assert call_in_a_process_of_its_own(tmp_path) == (20, 1)
+
+
+def test_a_record_of_compilations_says_how_many_kernels_took_how_long_and_what_is_kept():
+    names = ["search.step", "search.step", "search.leap"]  # one of them for two types
+    assert str(Compiled(names, 1.24, kept=True)) == "kernels compiled once, kept on disk: 2 (1.2 s)"
+    assert str(Compiled(names, 1.24, kept=False)) == "kernels compiled and not kept for the next time: 2 (1.2 s)"
 
 
 def test_the_sources_are_read_without_a_look_into_caches_which_another_process_may_be_removing(tmp_path):
