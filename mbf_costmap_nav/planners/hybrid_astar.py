@@ -28,11 +28,12 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP
+from mbf_costmap_nav.kernels.car.joints import HEADINGS
 from mbf_costmap_nav.kernels.map.path_poses import yaw_quaternions
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND
 from mbf_costmap_nav.planning.car_search import TOO_WIDE, CarLeg, Driving, search_drive
 from mbf_costmap_nav.planning.car_world import CarWorkspace, CarWorld
-from mbf_costmap_nav.planning.grid_planning import check_tolerance, marked_if_permanent, off_map
+from mbf_costmap_nav.planning.grid_planning import check_tolerance, marked_if_never_fits, marked_if_permanent, off_map
 from mbf_costmap_nav.planning.path_assembly import heights_along
 from mbf_costmap_nav.planning.permanent_walls import is_in_walls, is_permanently_too_narrow, touches_walls
 from mbf_costmap_nav.planning.widest_disc import widest_disc
@@ -109,9 +110,9 @@ class HybridAStarPlanner(CostmapPlanner):
             if leg is None or len(leg.poses) == 0:
                 failure = failure or not_even_beside(self._no_path(world, start, goal, leg, name, tolerance), tolerance)
                 failure = self._marked_at_border(failure, world, goal, tolerance)
-                return (
-                    failure if failure.permanent else marked_if_permanent(failure, self.costmap, start, goal, tolerance)
-                )
+                if not failure.permanent:
+                    failure = marked_if_permanent(failure, self.costmap, start, goal, tolerance)
+                return marked_if_never_fits(failure, self.costmap, goal, tolerance, math.pi / HEADINGS)
             legs.append(leg)
         poses = np.concatenate([legs[0].poses, *(leg.poses[1:] for leg in legs[1:])])
         path = to_path(poses, heights_along(poses[:, :2], request), world.costmap.frame_id, self.clock.now())

@@ -28,7 +28,7 @@ from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.planning.manoeuvres import Fitted
 from mbf_costmap_nav.planning.path_assembly import assembled
 from mbf_costmap_nav.planning.path_fitting import PathFitting, shifted_request
-from mbf_costmap_nav.planning.permanent_walls import is_in_walls, is_permanently_unreachable
+from mbf_costmap_nav.planning.permanent_walls import is_in_walls, is_permanently_unreachable, never_fits
 from mbf_costmap_nav.planning.search_grid import Cell, GridPlannerParameters, SearchGrid, SearchWorkspace
 from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
 
@@ -90,7 +90,8 @@ class GridPlanner(CostmapPlanner):
         blocked_cell = grid.is_blocked(grid.cell_of(goal))  # the search says so, or looks for one near by
         end = problem or (goal if blocked_cell else fitting.fitting_goal(request))
         if isinstance(end, PlanResult):
-            return marked_if_permanent(end, self.costmap, request.start, goal, request.dist_tolerance)
+            end = marked_if_permanent(end, self.costmap, request.start, goal, request.dist_tolerance)
+            return marked_if_never_fits(end, self.costmap, goal, request.dist_tolerance, request.angle_tolerance)
         result = self._plan_to(end, grid, fitting, request)
         # The cell near by that the search has found may be too near to what blocks the goal for the outline.
         if blocked_cell and request.dist_tolerance > 0.0 and result.outcome in DOES_NOT_FIT:
@@ -201,6 +202,17 @@ def marked_if_permanent(
         return failure
     text = f"{failure.message}; walls of the static map separate them"
     return replace(failure, message=text, permanent=True)
+
+
+def marked_if_never_fits(
+    failure: PlanResult, costmap: LayeredCostmap, goal: Pose, tolerance: float, angle_tolerance: float
+) -> PlanResult:
+    """Return a failure; BLOCKED_GOAL is permanent where permanent walls leave the outline no place at the goal."""
+    if failure.permanent or failure.outcome != GetPathOutcome.BLOCKED_GOAL:
+        return failure
+    if not never_fits(costmap, goal, tolerance, angle_tolerance):
+        return failure
+    return replace(failure, message=f"{failure.message}; walls of the static map are there", permanent=True)
 
 
 def check_tolerance(tolerance: float) -> None:

@@ -15,6 +15,7 @@ from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN, Costmap
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.map.pose_checks import find_valid_pose
 from mbf_costmap_nav.planning.widest_disc import disc_gets_there, in_reach
 
 EIGHT_NEIGHBOURS = np.ones((3, 3), dtype=bool)
@@ -63,6 +64,20 @@ def is_permanently_too_narrow(costmap: LayeredCostmap, start: Pose, goal: Pose, 
     if walls is None or not (walls.contains(start.x, start.y) and walls.contains(goal.x, goal.y)):
         return False
     return not disc_gets_there(walls, costmap.footprint, start, goal, tolerance)
+
+
+def never_fits(costmap: LayeredCostmap, goal: Pose, tolerance: float, angle_tolerance: float) -> bool:
+    """Whether the outline touches permanent walls at all poses within both tolerances [m, rad] of a goal.
+
+    The outline is taken half a cell smaller: planners look at samples of it.
+    """
+    walls = costmap.permanent_costmap()
+    if walls is None or not walls.contains(goal.x, goal.y):
+        return False
+    spare = 0.5 * walls.resolution
+    if len(costmap.footprint.vertices) < 3 or costmap.footprint.inscribed_radius <= spare:
+        return False
+    return find_valid_pose(walls, costmap.footprint.padded(-spare), goal, tolerance, angle_tolerance).pose is None
 
 
 def _pieces(walls: Costmap, threshold: int) -> NDArray[np.unsignedinteger]:

@@ -169,3 +169,36 @@ def test_a_permanent_layer_that_reports_a_change_by_itself_is_looked_at_again(ro
     costmap.layers["static"]._changed = costmap.geometry.box
     costmap.update(Pose.planar(1.0, 2.5), 2.0)
     assert before.cells.max() == 254 and costmap.permanent_costmap().cells.max() == 0
+
+
+LONG = Footprint([[0.8, 0.25], [-0.2, 0.25], [-0.2, -0.25], [0.8, -0.25]])
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
+@pytest.mark.parametrize(
+    ("walls", "request_", "permanent"),
+    [
+        (True, {}, True),
+        (True, {"dist_tolerance": 0.3}, True),
+        (True, {"dist_tolerance": 1.5}, None),
+        (False, {"dist_tolerance": 0.3}, False),
+    ],
+)
+def test_a_goal_where_walls_leave_the_outline_no_place_is_blocked_for_good(
+    make_plugin, planner_class, walls, request_, permanent
+):
+    """The middle fits at (4.4, 2.5), but not the robot ahead of it, which reaches into the wall at 5 m."""
+    layers = [{"name": name, "type": name} for name in ("static", "obstacle", "inflation")]
+    parameters = CostmapParameters(footprint=LONG.vertices.tolist(), footprint_padding=0.0, layers=layers)
+    static = two_rooms(0) if walls else Costmap(np.zeros((50, 101), dtype=np.uint8), 0.1)
+    costmap = build_layered_costmap(parameters, {"obstacle": OBSTACLES}, static_map=static)
+    if not walls:
+        costmap.insert_points("scan", [(5.05, 0.05 + 0.1 * k, 0.2) for k in range(50)], (1.0, 2.5, 0.2), 0.0)
+    costmap.update(Pose.planar(1.0, 2.5), 0.0)
+    planner = make_plugin(planner_class, static, costmap=costmap)
+    result = planner.make_plan(PlanRequest(Pose.planar(1.0, 2.5), Pose.planar(4.6, 2.5), **request_))
+    if permanent is None:
+        assert result.success
+    else:
+        assert (result.outcome, result.permanent) == (GetPathOutcome.BLOCKED_GOAL, permanent)
+        assert ("walls of the static map are there" in result.message) == permanent
