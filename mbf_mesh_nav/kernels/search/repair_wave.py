@@ -21,8 +21,8 @@ _AHEAD: Any = Index(64)  # the same for its edges
 _NEAR_AHEAD: Any = Index(32)  # the same for the field at its first and last neighbour; the others lie between them
 _LAST: Any = Index(5)  # of the edges of most vertices, which are six; asking for what lies behind the end does no harm
 _MANY: Any = Index(8192)  # vertices listed since the list was looked through, which are still in the caches then
-_LISTED = -2  # as a predecessor: a changed vertex to which the walk has yet to come, or a root
-_NONE = -1
+_NONE, _LISTED = -1, -2  # as predecessors: of a reset vertex; of a changed one to which the walk has yet to come
+_ROOT = 2**31 - 1  # of a root: all that is reached, but for changed vertices, has one of at least 0
 
 
 @kernel
@@ -64,7 +64,7 @@ def invalidate_subtrees(
     for number in roots:
         root = Index(number)
         if predecessors[root] == _NONE:  # not if another root leads to it
-            predecessors[root] = _LISTED
+            predecessors[root] = _ROOT
     # 1. Reset the changed vertices and everything behind them, and list what lies beside and is not reset yet.
     while reader < count:
         vertex = Index(reset[reader])
@@ -93,17 +93,17 @@ def invalidate_subtrees(
             # To one list or the other, or to none, without a branch: written behind both, counted where it belongs.
             other = Index(graph.neighbours[slot])
             before = predecessors[other]
-            is_child = Index(before) == vertex
+            is_child = Index(Index(before) == vertex)
             reset[count] = beside[beside_count] = other
-            count += Index(is_child)
-            beside_count += Index((not is_child) & (before != _NONE))
+            count += is_child
+            beside_count += Index(before >= 0) - is_child
     # 2. The wave starts again from the roots among them and from what stayed intact beside them.
     beside_count = _still_reached(beside, beside_count, distances)
     seeds = np.empty(Index(len(roots)) + beside_count, dtype=np.int32)
     seed_count = Index(0)
     for index in range(len(roots)):
         root = Index(roots[index])
-        if predecessors[root] == _LISTED:
+        if predecessors[root] == _ROOT:
             predecessors[root] = _NONE
         if distances[root] == np.inf and not graph.blocked[root]:
             distances[root] = root_distances[index]
