@@ -122,12 +122,14 @@ def propagate_distances(
             begin, end = Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])
             while begin < end:
                 # The edges that gain, as bits, without a branch: about one at a vertex does, and nobody knows which.
-                chunk, gaining, bit = begin, Index(0), ONE
+                # The last one first, see ``lowest_bit.py``.
+                chunk, gaining = begin, Index(0)
                 begin = min(begin + BITS, end)
-                for slot in range(chunk, begin):
+                slot = begin
+                for _ in range(chunk, begin):
+                    slot -= ONE
                     gains = base + graph.weights[slot] < distances[Index(graph.neighbours[slot])]
-                    gaining |= bit if gains else Index(0)
-                    bit += bit  # a shift by the slot's number would be turned into vectors, too long for six edges
+                    gaining += gaining + Index(gains)
                 while gaining != 0:
                     slot = chunk + lowest_bit(gaining)
                     gaining &= gaining - ONE

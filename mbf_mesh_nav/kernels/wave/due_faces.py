@@ -32,12 +32,11 @@ def due_faces(corner_ends: IntArray, state: NDArray[np.uint8], begin: int, end: 
     """The records from ``begin`` to before ``end`` through which a wave goes on, as bits.
 
     Those whose sum of states is among the bits of ``sums``. A third of the records are, and nobody knows which, so this
-    is without branches: a comparison would be made one.
+    is without branches, see ``lowest_bit.py``.
     """
-    due, bit = Index(0), ONE
-    for record in range(begin, end):
-        ends = record * ENDS
+    due, ends = Index(0), end * ENDS
+    for _ in range(begin, end):
+        ends -= ENDS
         states = state[Index(corner_ends[ends])] + state[Index(corner_ends[ends + ONE])]
-        due |= bit * ((sums >> states) & ONE)
-        bit += bit  # a shift by the record's number would be turned into vectors, which costs more with six records
+        due += due + ((sums >> states) & ONE)
     return due  # type: ignore[no-any-return]
