@@ -69,12 +69,12 @@ def is_permanently_too_narrow(costmap: LayeredCostmap, start: Pose, goal: Pose, 
 def never_fits(costmap: LayeredCostmap, goal: Pose, tolerance: float, angle_tolerance: float) -> bool:
     """Whether the outline touches permanent walls at all poses within both tolerances [m, rad] of a goal.
 
-    The outline is taken half a cell smaller: planners look at samples of it.
+    The outline is taken a quarter of a cell smaller: so much may lie between the samples that planners look at.
     """
     walls = costmap.permanent_costmap()
     if walls is None or not walls.contains(goal.x, goal.y):
         return False
-    spare = 0.5 * walls.resolution
+    spare = 0.25 * walls.resolution
     if len(costmap.footprint.vertices) < 3 or costmap.footprint.inscribed_radius <= spare:
         return False
     return find_valid_pose(walls, costmap.footprint.padded(-spare), goal, tolerance, angle_tolerance).pose is None

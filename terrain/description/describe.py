@@ -13,6 +13,7 @@ from mbf_abstract.geometry import FloatArray
 from terrain.description.description import RobotDescription
 from terrain.description.masses import mass_of, notes_on_masses, some_of
 from terrain.description.mesh_files import find_file, missing_text
+from terrain.description.motors import GRAVITY, with_note_on_motors
 from terrain.description.outline import Corner, convex_outline, note_on_its_size, surrounds_base, with_few_corners
 from terrain.description.parameters import UrdfRobot
 from terrain.description.running_gear import RunningGear, note_on_its_side, sides_of, solids_of
@@ -27,7 +28,6 @@ USUAL_SPEED = 1.0  # m/s, where the file states no speed of the wheels
 USUAL_YAW_RATE = 1.5  # rad/s
 USUAL_STEERING_ANGLE = 0.5  # rad
 STEERED = 9  # angles at which a steered wheel is looked at
-GRAVITY = 9.81
 SCRUB = 0.35  # of (wheelbase / track)^2: what a skid-steered robot of a Husky's wheels loses (see RobotSpec)
 DIGITS = 6
 
@@ -46,7 +46,7 @@ def describe(stated: UrdfRobot) -> RobotDescription:
     urdf = read_urdf(file)
     frames = link_frames(urdf)
     gear = find_running_gear(urdf, stated.drive, stated.wheels, stated.wheel_radius)
-    return _Describer(urdf, stated, frames, gear, _base(gear)).description()
+    return with_note_on_motors(_Describer(urdf, stated, frames, gear, _base(gear)).description())
 
 
 def _base(gear: RunningGear) -> FloatArray:

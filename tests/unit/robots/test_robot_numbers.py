@@ -8,6 +8,7 @@ import pytest
 
 from mbf_abstract.config.findings import ConfigError
 from terrain.description.describe import describe
+from terrain.description.motors import holds_on
 from terrain.description.outline import footprint_radii
 from terrain.description.parameters import UrdfRobot
 from terrain.description.placeholders import robot_values
@@ -132,6 +133,18 @@ def test_a_limit_of_zero_is_no_limit_and_that_is_said(described):
     assert found.max_speed == 1.0 and found.motor_torque > 0.0
     for name in ("velocity", "effort"):
         assert any(note.startswith(f"{name}: a limit of 0") for note in found.notes)
+
+
+@pytest.mark.parametrize(("torque", "held"), [(1.0, 0.2), (3.0, None)])
+def test_motors_too_weak_for_the_slopes_of_the_plans_are_noted(described, torque, held):
+    """Four wheels of 0.2 m pull 4 torque / 0.2; the slope is that of which gravity pulls as much."""
+    found = described(robot(BODY, *FOUR_WHEELS), motor_torque=torque, mass=10.0)
+    notes = [note for note in found.notes if "motors hold" in note]
+    assert found.wheel_radius == 0.2 and (len(notes) == 1) == (held is not None)
+    if held is not None:
+        assert holds_on(found) == pytest.approx(math.asin(4.0 * torque / 0.2 / (10.0 * 9.81)))
+        assert "up to 12 degrees (1 N m on each of 4 wheels of 0.2 m, 10 kg)" in notes[0] and "26 degrees" in notes[0]
+    assert not any("motors hold" in note for note in described(robot(BODY, *FOUR_WHEELS), max_slope=0.1).notes)
 
 
 @pytest.mark.parametrize("radius", [0.12, 0.25])
