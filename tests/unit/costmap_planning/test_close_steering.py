@@ -65,7 +65,7 @@ def test_the_kernel_finds_the_sequence_that_a_look_at_all_finds(seed):
     assert found == pytest.approx(naive_best(grid, check, start, wanted, lengths, curvatures, *steering, *steps))
 
 
-def drive(controller, path, start, seconds=120.0):
+def drive(controller, path, start, seconds=120.0, radius=RADIUS):
     """Drive without inertia; return how it ended, and how far base and nose were beside the path (n, 2) [m]."""
     tracker, pose, velocity, beside = PathTracker(path, dimensions=2), Pose.planar(*start), Twist(), []
     tracker.cusp_reached = 0.01
@@ -78,7 +78,7 @@ def drive(controller, path, start, seconds=120.0):
         if not result.success:
             return result.outcome, np.array(beside)
         velocity = result.command
-        assert abs(velocity.wz) * RADIUS <= abs(velocity.vx) + 1e-9
+        assert abs(velocity.wz) * radius <= abs(velocity.vx) + 1e-9
         turn = 0.05 * velocity.wz
         x, y = (
             (pose.x + 0.05 * velocity.vx * math.cos(pose.yaw + 0.5 * turn)),
@@ -144,3 +144,28 @@ def test_headings_that_do_not_look_along_the_path_are_not_steered_to(make_plugin
     pose = Pose.planar(1.5, 2.0, math.pi if controller.tracker.driving_backward else 0.0)
     command = controller.compute_velocity_commands(ControlRequest(pose, Twist())).command
     assert abs(command.wz) < 0.05 * abs(command.vx)
+
+
+BUS = Footprint([[9.0, 1.25], [-3.0, 1.25], [-3.0, -1.25], [9.0, -1.25]])
+TOY = Footprint([[0.06, 0.03], [-0.02, 0.03], [-0.02, -0.03], [0.06, -0.03]])
+
+
+@pytest.mark.parametrize(
+    ("outline", "radius", "resolution", "speed", "start", "goal", "beside_path"),
+    [
+        (BUS, 8.0, 0.1, 2.0, (20.0, 20.0, 0.0), (20.0, 26.0, math.pi), 0.25),
+        (TOY, 0.08, 0.01, 0.3, (1.0, 1.0, 0.0), (1.5, 1.2, -2.0), 0.02),
+    ],
+    ids=["bus", "toy"],
+)
+def test_cars_of_all_sizes_keep_to_their_paths(
+    make_plugin, outline, radius, resolution, speed, start, goal, beside_path
+):
+    grid = Costmap(np.zeros((600, 600), dtype=np.uint8), resolution)
+    car = {"footprint": outline, "turning_radius": radius}
+    result = make_plugin(HybridAStarPlanner, grid, **car).make_plan(
+        PlanRequest(Pose.planar(*start), Pose.planar(*goal))
+    )
+    controller = make_plugin(RegulatedPurePursuitController, grid, max_vel_x=speed, **car)
+    ending, beside = drive(controller, result.path, start, radius=radius)
+    assert ending == "arrived" and beside[:, 0].max() < beside_path
