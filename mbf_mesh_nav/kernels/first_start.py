@@ -19,6 +19,7 @@ from mbf_mesh_nav.kernels.layers.neighbourhood_layers import height_differences,
 from mbf_mesh_nav.kernels.mesh.bounding_boxes import closest_face, closest_faces
 from mbf_mesh_nav.kernels.mesh.corners import build_corner_ends, write_corner_weights
 from mbf_mesh_nav.kernels.mesh.defects import face_shapes, fans_at_vertices, superfluous_faces
+from mbf_mesh_nav.kernels.mesh.incidence import faces_of_vertices, groups_of_pairs, neighbours_of_vertices
 from mbf_mesh_nav.kernels.mesh.slopes import inclinations
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.mesh.topology import (
@@ -47,16 +48,19 @@ def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
     bound = (points, reals)
     return [
         (face_shapes, (rows, face_rows)),
+        (faces_of_vertices, (face_rows, 1)),
         (faces_across_edges, (face_rows, numbers, numbers)),
         (superfluous_faces, (face_rows, numbers, numbers)),
         (fans_at_vertices, (face_rows, face_rows, numbers, numbers)),
+        (groups_of_pairs, (face_rows, 1)),
         (morton_codes, (rows, reals, 0.0)),
+        (neighbours_of_vertices, (face_rows, numbers, numbers)),
         (edges_of_neighbours, (rows, numbers, numbers)),
         (unit_face_normals, (rows, face_rows)),
         (unit_vertex_normals, (rows, numbers, numbers)),
         (show_changes, (listed, listed, costs, costs, _fixed(flags), 0.0, numbers, floats, flags, floats)),
         (settle_footprints, (surface, reals, _example(np.int64), 0.0, 0.0, True, reals)),
-        (inclinations, (points,)),
+        (inclinations, (reals,)),
         (mean_edge_angles, (points, listed, listed)),
         (neighbourhood_means, (reals, points, listed, listed, 0.0)),
         (height_differences, (points, points, listed, listed, 0.0, 0.0)),

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.kernels.mesh.slopes import inclinations
 from mbf_mesh_nav.map.height_error import Errors, HeightErrorParameters, angle_of, errors_for, narrowed
@@ -46,7 +48,7 @@ class SteepnessLayer(MeshLayer):
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = inclination [rad] from 0 to pi, lethal above ``threshold`` less the error of the normals."""
-        costs = inclinations(self.topology.vertex_normals)
+        costs = inclinations(np.ascontiguousarray(self.topology.vertex_normals[:, 2]))
         return costs, costs > narrowed(self.parameters.threshold, self.normal_error, 0.0)
 
     @property

@@ -40,7 +40,8 @@ def _fill_boxes(vertices: FloatArray, faces: IntArray, margin: float, levels: In
         a, b, c = triangle(vertices, faces, Index(face))
         leaf, is_first = face // BRANCHES, face % BRANCHES == 0
         for axis in range(3):
-            least, most = min(a[axis], b[axis], c[axis]) - margin, max(a[axis], b[axis], c[axis]) + margin
+            least, most = min(min(a[axis], b[axis]), c[axis]), max(max(a[axis], b[axis]), c[axis])
+            least, most = least - margin, most + margin
             boxes[leaf, axis] = least if is_first else min(boxes[leaf, axis], least)
             boxes[leaf, axis + 3] = most if is_first else max(boxes[leaf, axis + 3], most)
     for level in range(1, len(levels) - 1):

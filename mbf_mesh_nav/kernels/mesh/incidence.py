@@ -62,7 +62,7 @@ def neighbours_of_vertices(faces: IntArray, face_offsets: IntArray, incident: In
             for vertex in range(vertex_count):
                 cursor[vertex] = offsets[vertex]
                 offsets[vertex + 1] += offsets[vertex]
-            neighbours = np.empty(offsets[vertex_count], dtype=np.int32)
+            neighbours = np.empty(Count(offsets[vertex_count]), dtype=np.int32)
     return offsets, neighbours
 
 
@@ -83,7 +83,10 @@ def groups_of_pairs(pairs: IntArray, count: int) -> IntArray:
         while leader[other] != other:
             leader[other] = leader[leader[other]]
             other = leader[other]
-        leader[max(one, other)] = min(one, other)
+        if one < other:
+            leader[other] = one
+        else:
+            leader[one] = other
     groups = 0
     for thing in range(count):  # in place: leaders come first, and have their number already
         if leader[thing] == thing:

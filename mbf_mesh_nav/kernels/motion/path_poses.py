@@ -90,7 +90,7 @@ def poses_along(positions: FloatArray, normals: FloatArray, tolerance: float) ->
 @inner_kernel
 def _quaternion(a: Vector, b: Vector, c: Vector) -> tuple[float, float, float, float]:
     """Quaternion of the frame with the axes a, b, c (Shepperd's method: start from the largest component)."""
-    largest = max(a[0], b[1], c[2], a[0] + b[1] + c[2])
+    largest = max(max(a[0], b[1]), max(c[2], a[0] + b[1] + c[2]))
     if largest == a[0]:
         x, y, z, w = 1.0 + a[0] - b[1] - c[2], b[0] + a[1], c[0] + a[2], b[2] - c[1]
     elif largest == b[1]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mbf_mesh_nav.arrays import Float32Array, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.prefetch import prefetch
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph
 
@@ -99,7 +99,7 @@ def invalidate_subtrees(
             beside_count += Index(before >= 0) - is_child
     # 2. The wave starts again from the roots among them and from what stayed intact beside them.
     beside_count = _still_reached(beside, beside_count, distances)
-    seeds = np.empty(Index(len(roots)) + beside_count, dtype=np.int32)
+    seeds = np.empty(Count(len(roots)) + Count(beside_count), dtype=np.int32)
     seed_count = Index(0)
     for index in range(len(roots)):
         root = Index(roots[index])

@@ -92,7 +92,7 @@ def straighten(
             points, marks = spliced(points, marks, pulled, pulled_marks, low, high)
             corridor = turned_corridor(corridor, fan, first, last)
             has_turned = is_changed = True
-            index = max(first - 1, 0)
+            index = first - 1 if first > 1 else 0
     if has_turned:  # so that the points do not depend on the order of the turns
         points, marks = pull_marked(mesh.vertices, mesh.faces, corridor, start, goal)
     return points, corridor

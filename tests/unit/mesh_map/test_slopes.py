@@ -20,7 +20,7 @@ def test_inclination_is_the_angle_to_the_vertical_from_level_to_upside_down():
     extremes = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 1.0 + 1e-15]])
     normals = np.concatenate([extremes, unit_normals()])
     expected = [math.acos(min(max(z, -1.0), 1.0)) for z in normals[:, 2].tolist()]
-    assert inclinations(normals).tolist() == np.float32(expected).tolist()
+    assert inclinations(np.ascontiguousarray(normals[:, 2])).tolist() == np.float32(expected).tolist()
 
 
 def test_arc_cosines_are_those_of_the_c_library_to_one_unit_in_the_last_place():

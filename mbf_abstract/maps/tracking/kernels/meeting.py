@@ -117,7 +117,8 @@ def write_encounters(
                 continue
             # 3. The robot that stays.
             ahead, aside = cosine_now * x + sine_now * y, cosine_now * y - sine_now * x
-            beyond_x, beyond_y = max(back - ahead, ahead - front, zero), max(right - aside, aside - left, zero)
+            beyond_x = max(max(back - ahead, ahead - front), zero)
+            beyond_y = max(max(right - aside, aside - left), zero)
             reach = radius + objects[k, RADIUS]
             gap = np.sqrt(beyond_x * beyond_x + beyond_y * beyond_y) - reach
             staying = min(max(one - gap * per_margin, zero), one)
