@@ -78,8 +78,11 @@ def jacksboro(
     rng : numpy Generator, optional
         Draws the bumps.
     """
-    from matplotlib import cbook
-
+    try:
+        from matplotlib import cbook
+    except ImportError as error:
+        text = "the elevations of Jacksboro come with matplotlib"
+        raise ImportError(f"{text}: pip install 'mbf-flex[sim]' ({error})") from error
     with np.load(cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False), allow_pickle=False) as data:
         elevation, degrees = np.asarray(data["elevation"]), float(data["dx"])
         latitude = 0.5 * (float(data["ymin"]) + float(data["ymax"]))

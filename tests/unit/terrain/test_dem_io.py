@@ -1,5 +1,6 @@
 """Readers of elevation models: the raster facts of real files, and refusals that name file and reason."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -149,3 +150,9 @@ def test_a_grid_with_more_text_than_heights_is_refused_before_it_is_read(tmp_pat
     (tmp_path / "long.asc").write_text("ncols 2\nnrows 2\ncellsize 1\n1 2 3 4" + " 5" * 1000)
     with pytest.raises(TerrainFileError, match="expected 2 x 2 heights, got"):
         read_elevation(tmp_path / "long.asc")
+
+
+def test_jacksboro_without_matplotlib_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(ImportError, match=r"Jacksboro come with matplotlib: pip install 'mbf-flex\[sim\]'"):
+        jacksboro(100.0)
