@@ -19,6 +19,21 @@ def backward(motion):
     return any(command.vx < 0.0 for command in motion.commands)
 
 
+def somebody_passes(world, seen, stops, when_beside):
+    """At each command: so far [m] beside its path it is surrounded once, then alone; where, is in ``stops``."""
+
+    def look(pose):
+        if not stops and abs(pose.y - 3.0) > when_beside:
+            around = np.linspace(0.0, 2.0 * math.pi, 60)
+            world.see(seen, *((pose.x + 0.45 * math.cos(a), pose.y + 0.45 * math.sin(a)) for a in around))
+            stops.append(pose)
+        elif stops:
+            seen.clear()
+            seen.update(pose, 0.0)
+
+    return look
+
+
 @pytest.mark.parametrize("above", [True, False])
 @pytest.mark.parametrize(("x0", "x1"), [(2.4, 3.4), (5.4, 6.4)], ids=["behind", "ahead"])
 def test_in_a_corridor_the_nearest_bay_is_taken(give_way, x0, x1, above):
@@ -186,17 +201,8 @@ def test_it_follows_a_path_that_is_not_along_x(give_way):
 def test_what_it_drives_to_pull_out_is_no_path_that_it_keeps_free(give_way, world):
     """Somebody stops it when it is nearly there: then it stands far enough beside its path, and need not go on."""
     seen, stops = world.sensing(), []
-
-    def somebody_passes(pose):
-        if not stops and abs(pose.y - 3.0) > 0.65:
-            around = np.linspace(0.0, 2.0 * math.pi, 60)
-            world.see(seen, *((pose.x + 0.45 * math.cos(a), pose.y + 0.45 * math.sin(a)) for a in around))
-            stops.append(pose)
-        elif stops:
-            seen.clear()
-            seen.update(pose, 0.0)
-
-    result, motion = give_way(hall, distance=0.6, navigation_map=seen, on_command=somebody_passes)
+    passes = somebody_passes(world, seen, stops, when_beside=0.65)
+    result, motion = give_way(hall, distance=0.6, navigation_map=seen, on_command=passes)
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
     assert motion.end.distance_to(stops[0]) < 0.3
 
@@ -245,17 +251,8 @@ def test_from_where_it_cannot_turn_to_its_path_it_goes_back_the_way_it_came(give
 def test_a_drive_that_somebody_stops_goes_on_once_they_are_gone(give_way, world):
     """They surround the robot, and are gone when the robot stands."""
     seen, stops = world.sensing(), []
-
-    def somebody_passes(pose):
-        if not stops and abs(pose.y - 3.0) > 0.1:
-            around = np.linspace(0.0, 2.0 * math.pi, 60)
-            world.see(seen, *((pose.x + 0.45 * math.cos(a), pose.y + 0.45 * math.sin(a)) for a in around))
-            stops.append(pose)
-        elif stops:
-            seen.clear()
-            seen.update(pose, 0.0)
-
-    result, motion = give_way(hall, distance=0.6, navigation_map=seen, on_command=somebody_passes)
+    passes = somebody_passes(world, seen, stops, when_beside=0.1)
+    result, motion = give_way(hall, distance=0.6, navigation_map=seen, on_command=passes)
     assert stops
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
     assert abs(motion.end.y - 3.0) > 0.5
