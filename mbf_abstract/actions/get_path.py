@@ -16,7 +16,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.plan_check import area_in_global_frame, in_global_frame, path_result
-from mbf_abstract.execution.planner import FALLBACK_OUTCOMES, PlannerExecution, PlannerState
+from mbf_abstract.execution.planner import FALLBACK_OUTCOMES, PlannerExecution
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.feedback_types import NoFeedback
@@ -25,7 +25,7 @@ from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.goals.result_types import GetPathResult
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginKind
+from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PluginKind
 
 Handle = GoalHandle[GetPathGoal, GetPathResult, NoFeedback]
 Job = GoalJob[GetPathGoal, GetPathResult, NoFeedback]
@@ -61,7 +61,7 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         handle, plugin = job.handle, self._plugin(job)
         # 2. Everything the planner sees is in the global frame.
         try:
-            request = self._request(handle.goal, handle)
+            request = self._request(handle)
             area = area_in_global_frame(handle.goal.goal_area, self.runtime)
         except (TransformError, RobotStateError) as error:
             return GetPathResult(GetPathOutcome.TF_ERROR, str(error), planner=plugin.name)
@@ -96,16 +96,20 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
                 # permanent: no recovery brings a map
                 return GetPathResult(GetPathOutcome.MAP_ERROR, missing, planner=plugin.name, permanent=True)
             execution = PlannerExecution(run, request, area, has_fallback, handle.goal.max_retries)
-            state = execution.execute()
-            if run.waited and not run.canceled:
-                return GetPathResult(GetPathOutcome.PAT_EXCEEDED, run.waited, planner=plugin.name)
-            judge = partial(self._result, state, execution.last_result, handle, request, area, plugin.name)
-            return run.call_beside("the map's path_problem()", judge)
+            end = execution.execute()
+            # 4. Check the path of a plugin that reports success.
+            judge = partial(path_result, end, execution.last_result, request, self.runtime, plugin.name, area)
+            result = run.call_beside("the map's path_problem()", judge)
+        if result.path is not None:
+            numbers = {"cost": result.cost, "length": result.path.length, "poses": len(result.path)}
+            self.runtime.events.emit(EventKind.PLAN, self.name, goal_id=handle.id, plugin=plugin.name, **numbers)
+        return result
 
-    def _request(self, goal: GetPathGoal, handle: Handle) -> PlanRequest:
+    def _request(self, handle: Handle) -> PlanRequest:
         def to_global(pose: Pose) -> Pose:
             return in_global_frame(pose, self.runtime)
 
+        goal = handle.goal
         relaxed = self.runtime.relaxation.slack(self.runtime.clock.now()).plan_distance
         distance, angle = self._tolerances(goal)
         return PlanRequest(
@@ -123,39 +127,6 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         usual = (parameters.dist_tolerance, parameters.angle_tolerance) if goal.goal_area is None else (0.0, 0.0)
         distance = usual[0] if goal.dist_tolerance is None else goal.dist_tolerance
         return distance, usual[1] if goal.angle_tolerance is None else goal.angle_tolerance
-
-    def _result(
-        self,
-        state: PlannerState,
-        last: PlanResult | None,
-        handle: Handle,
-        request: PlanRequest,
-        area: GoalArea | None,
-        planner: str,
-    ) -> GetPathResult:
-        fields: dict[str, Any] = {"planner": planner}
-        if last is None:
-            last = PlanResult(GetPathOutcome.FAILURE)
-        else:
-            fields.update(plugin_outcome=int(last.outcome), plugin_message=last.message)
-        if state is PlannerState.FOUND_PLAN:
-            return self._found(last, handle, request, area, planner)
-        if state is PlannerState.CANCELED:
-            return GetPathResult(GetPathOutcome.CANCELED, handle.cancel_reason, **fields)
-        if state is PlannerState.PAT_EXCEEDED:
-            tail = f"; last message of the planner: {last.message}" if last.message else ""
-            return GetPathResult(GetPathOutcome.PAT_EXCEEDED, f"no plan within {self.patience:g} s{tail}", **fields)
-        return GetPathResult(int(last.outcome), last.message, cost=last.cost, permanent=last.permanent, **fields)
-
-    def _found(
-        self, answer: PlanResult, handle: Handle, request: PlanRequest, area: GoalArea | None, planner: str
-    ) -> GetPathResult:
-        """4. Check the path of a plugin that reports success."""
-        result = path_result(answer, request, self.runtime, planner, area)
-        if result.path is not None:
-            numbers = {"cost": result.cost, "length": result.path.length, "poses": len(result.path)}
-            self.runtime.events.emit(EventKind.PLAN, self.name, goal_id=handle.id, plugin=planner, **numbers)
-        return result
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> GetPathResult:
         """Result without a path."""

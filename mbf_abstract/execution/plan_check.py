@@ -84,14 +84,25 @@ def leaves_map(path: Path, runtime: Runtime) -> str:
 
 
 def path_result(
-    answer: PlanResult, request: PlanRequest, runtime: Runtime, planner: str, area: GoalArea | None = None
+    answer: PlanResult,
+    last: PlanResult | None,
+    request: PlanRequest,
+    runtime: Runtime,
+    planner: str,
+    area: GoalArea | None = None,
 ) -> GetPathResult:
-    """Judge the last answer of a planner: its path in the global frame, or why there is none."""
-    fields: dict[str, Any] = {
-        "planner": planner,
-        "plugin_outcome": int(answer.outcome),
-        "plugin_message": answer.message,
-    }
+    """Judge how planning ended: its path in the global frame, or why there is none.
+
+    Parameters
+    ----------
+    answer, last : PlanResult
+        What ends the goal, and the planner's own last answer; None if it was never asked.
+    planner : str
+        Its name.
+    """
+    fields: dict[str, Any] = {"planner": planner}
+    if last is not None:
+        fields.update(plugin_outcome=int(last.outcome), plugin_message=last.message)
     if not answer.success:
         return GetPathResult(
             int(answer.outcome), answer.message, cost=answer.cost, permanent=answer.permanent, **fields

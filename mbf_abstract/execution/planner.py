@@ -22,6 +22,7 @@ fallback's then. After other failures, which the fallback is not called for, the
 from __future__ import annotations
 
 from enum import Enum
+from functools import partial
 
 from mbf_abstract.execution.plugin_answer import PluginFault
 from mbf_abstract.execution.plugin_run import PluginRun
@@ -34,7 +35,7 @@ FALLBACK_OUTCOMES = (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_START,
 
 
 class PlannerState(Enum):
-    """Where a planner execution is; the last seven are its ends."""
+    """Where a planner execution is; the last six are its ends."""
 
     INITIALIZED = "initialized"
     STARTED = "started"
@@ -44,12 +45,18 @@ class PlannerState(Enum):
     PAT_EXCEEDED = "pat_exceeded"
     NO_PLAN_FOUND = "no_plan_found"
     CANCELED = "canceled"
-    STOPPED = "stopped"
     INTERNAL_ERROR = "internal_error"
 
 
 class PlannerExecution:
-    """One get_path goal's calls of its planner."""
+    """One get_path goal's calls of its planner.
+
+    Attributes
+    ----------
+    state : PlannerState
+    last_result : PlanResult, optional
+        The planner's last answer; None if it was never asked.
+    """
 
     def __init__(
         self,
@@ -68,59 +75,67 @@ class PlannerExecution:
         self.state = PlannerState.INITIALIZED
         self.last_result: PlanResult | None = None
 
-    def execute(self) -> PlannerState:
-        """Call the planner until it succeeds or the rules end it; the answer is in ``last_result``."""
+    def execute(self) -> PlanResult:
+        """Call the planner until it succeeds or the rules end it; its own last answer, or CANCELED, PAT_EXCEEDED."""
         self._enter(PlannerState.STARTED)
         if not self._run.acquire_plugin():
-            return self._enter(PlannerState.CANCELED if self._run.canceled else PlannerState.PAT_EXCEEDED)
+            return self._canceled() if self._run.canceled else self._patience_end(self._run.waited)
         calls = 0
         while True:
             if self._run.canceled:
-                return self._enter(PlannerState.CANCELED)
+                return self._canceled()
             if calls and self._run.is_patience_over():
-                return self._enter(PlannerState.PAT_EXCEEDED)
+                return self._patience_end()
             self._enter(PlannerState.PLANNING)
             try:
-                result = self._call()
+                self.last_result = result = self._call()
             except PluginFault as fault:
-                self.last_result = PlanResult(GetPathOutcome.INTERNAL_ERROR, str(fault))
-                return self._enter(PlannerState.INTERNAL_ERROR)
+                self.last_result = result = PlanResult(GetPathOutcome.INTERNAL_ERROR, str(fault))
+                return self._end(PlannerState.INTERNAL_ERROR, result)
             calls += 1
             end = self._judge(result, calls)
             if end is not None:
-                return self._enter(end)
+                return end
             self._runtime.clock.sleep(self._runtime.parameters.planner_retry_delay)
 
-    def _judge(self, result: PlanResult, calls: int) -> PlannerState | None:
-        """Whether this result ends the execution, in upstream's order; None = call again."""
+    def _judge(self, result: PlanResult, calls: int) -> PlanResult | None:
+        """What this answer ends the execution with, in upstream's order; None = call again."""
         falls_back = self._has_fallback and result.outcome in FALLBACK_OUTCOMES
         usual = self._runtime.parameters.planner_max_retries
         max_retries = 0 if falls_back else usual if self._max_retries is None else self._max_retries
         if self._run.canceled and not self._run.patience_exceeded:
-            return PlannerState.CANCELED
+            return self._canceled()
         if result.success:
-            return PlannerState.FOUND_PLAN
+            return self._end(PlannerState.FOUND_PLAN, result)
         if result.permanent:
-            return PlannerState.NO_PLAN_FOUND
+            return self._end(PlannerState.NO_PLAN_FOUND, result)
         if 0 < max_retries < calls:
-            return PlannerState.MAX_RETRIES
+            return self._end(PlannerState.MAX_RETRIES, result)
         if self._run.is_patience_over():
-            return PlannerState.PAT_EXCEEDED
-        return PlannerState.NO_PLAN_FOUND if max_retries == 0 else None
+            return self._patience_end()
+        return self._end(PlannerState.NO_PLAN_FOUND, result) if max_retries == 0 else None
 
     def _call(self) -> PlanResult:
-        planner = self._run.plugin.instance
-        result = self._run.ask_reported("make_plan", lambda: self._plan_with(planner), PlanResult)
-        self.last_result = result
+        make_plan = self._run.plugin.instance.make_plan
+        plan = partial(make_plan, self._request)
+        if self._area is not None:
+            plan = partial(plan_to_area, make_plan, self._request, self._area)
+        return self._run.ask_reported("make_plan", plan, PlanResult)
+
+    def _canceled(self) -> PlanResult:
+        return self._end(PlannerState.CANCELED, PlanResult(GetPathOutcome.CANCELED, self._run.handle.cancel_reason))
+
+    def _patience_end(self, waited: str = "") -> PlanResult:
+        last = self.last_result.message if self.last_result is not None else ""
+        tail = f"; last message of the planner: {last}" if last else ""
+        text = waited or f"no plan within {self._run.patience:g} s{tail}"
+        return self._end(PlannerState.PAT_EXCEEDED, PlanResult(GetPathOutcome.PAT_EXCEEDED, text))
+
+    def _end(self, state: PlannerState, result: PlanResult) -> PlanResult:
+        self._enter(state)
         return result
 
-    def _plan_with(self, planner: AbstractPlanner) -> PlanResult:
-        if self._area is None:
-            return planner.make_plan(self._request)
-        return plan_to_area(planner.make_plan, self._request, self._area)
-
-    def _enter(self, state: PlannerState) -> PlannerState:
+    def _enter(self, state: PlannerState) -> None:
         if state is not self.state:
             self._run.report_state("planner_execution", self.state.value, state.value)
             self.state = state
-        return state

@@ -185,8 +185,8 @@ class _PairPlan:
             return GetPathResult(GetPathOutcome.TF_ERROR, str(error), planner=planner.name)
         request = PlanRequest(start, goal, *tolerances, cancel_token=self.token)
         missing = self.server.missing_floor()
-        no_map = PlanResult(GetPathOutcome.MAP_ERROR, missing, permanent=True)
-        return path_result(no_map if missing else _ask(planner, request), request, runtime, planner.name)
+        answer = PlanResult(GetPathOutcome.MAP_ERROR, missing, permanent=True) if missing else _ask(planner, request)
+        return path_result(answer, answer, request, runtime, planner.name)
 
 
 def _ask(planner: AbstractPlanner, request: PlanRequest) -> PlanResult:
