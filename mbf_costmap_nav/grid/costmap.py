@@ -16,12 +16,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-CellArray = NDArray[np.uint8]
+from mbf_costmap_nav.kernels.costs import FREE as FREE
+from mbf_costmap_nav.kernels.costs import INSCRIBED as INSCRIBED
+from mbf_costmap_nav.kernels.costs import LETHAL as LETHAL
+from mbf_costmap_nav.kernels.costs import UNKNOWN as UNKNOWN
 
-FREE = 0
-INSCRIBED = 253
-LETHAL = 254
-UNKNOWN = 255
+CellArray = NDArray[np.uint8]
 
 MAX_CELLS = 64_000_000
 """Default limit of a map's size, 8000 x 8000 cells; checked before memory is taken."""

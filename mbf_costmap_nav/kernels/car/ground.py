@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import inner_kernel, plain_kernel
-from mbf_costmap_nav.grid.costmap import LETHAL
+from mbf_costmap_nav.kernels.costs import INSCRIBED, LETHAL, UNKNOWN
 from mbf_costmap_nav.kernels.map.footprint_cost import footprint_cost
 from mbf_costmap_nav.kernels.map.inflation import LARGEST_RADIUS, inflate
 from mbf_costmap_nav.kernels.map.line_cells import cost_along
@@ -123,7 +123,7 @@ def pose_cost(
 @plain_kernel
 def _fits(cells: NDArray[np.uint8], geometry: FloatArray, samples: FloatArray, pose: FloatArray) -> bool:
     worst = footprint_cost(cells, geometry[0], geometry[1], geometry[2], samples, pose[0], pose[1], pose[2])
-    return bool(0 <= worst < 254 or worst == 255)
+    return bool(0 <= worst < LETHAL or worst == UNKNOWN)
 
 
 @inner_kernel
@@ -132,8 +132,8 @@ def _centre_cost(cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, p
     iy = int(np.floor((pose[1] - geometry[2]) / geometry[0]))
     if ix < 0 or iy < 0 or ix >= cells.shape[1] or iy >= cells.shape[0]:
         return -1
-    cost = int(cells[iy, ix]) if cells[iy, ix] < 255 else unknown
-    return cost if cost < 253 else -1
+    cost = int(cells[iy, ix]) if cells[iy, ix] < UNKNOWN else unknown
+    return cost if cost < INSCRIBED else -1
 
 
 @plain_kernel
@@ -172,7 +172,7 @@ def driven_cost(ground: Ground, start: FloatArray, poses: FloatArray) -> float:
         if cost < 0:
             return -1.0
         cells_apart = abs(np.floor(x_next) - np.floor(x)) + abs(np.floor(y_next) - np.floor(y))
-        if cells_apart > 1.0 and cost_along(ground.cells, ground.unknown, x, y, x_next, y_next) >= 253:
+        if cells_apart > 1.0 and cost_along(ground.cells, ground.unknown, x, y, x_next, y_next) >= INSCRIBED:
             return -1.0
         total += cost
         x, y = x_next, y_next

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import kernel
+from mbf_costmap_nav.kernels.costs import UNKNOWN
 from mbf_costmap_nav.kernels.map.line_cells import cost_along
 
 UNKNOWN_AS = 0
@@ -42,7 +43,7 @@ def costs_near(cells: NDArray[np.uint8], points: NDArray[np.float64], lines: int
             iy = math.floor(points[i, 1] + dy * step / steps)
             for y in range(max(iy - 1, 0), min(iy + 2, cells.shape[0])):
                 for x in range(max(ix - 1, 0), min(ix + 2, cells.shape[1])):
-                    cost = int(cells[y, x]) if cells[y, x] < 255 else UNKNOWN_AS
+                    cost = int(cells[y, x]) if cells[y, x] < UNKNOWN else UNKNOWN_AS
                     of_lines[i] = max(of_lines[i], min(cost, HIGHEST))
     costs = np.zeros(count, dtype=np.int64)
     for i in range(count):

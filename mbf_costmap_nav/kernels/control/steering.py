@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import Index, inner_kernel, kernel
+from mbf_costmap_nav.kernels.costs import LETHAL
 from mbf_costmap_nav.kernels.map.footprint_cost import footprint_cost
 
 FloatArray = NDArray[np.float64]
@@ -119,7 +120,7 @@ def _touches(
 ) -> bool:
     """Whether the outline touches a lethal cell so far [m] along an arc."""
     x, y, yaw = _on_arc(poses, start, curvature, length)
-    return footprint_cost(cells, geometry[0], geometry[1], geometry[2], samples, x, y, yaw) == 254
+    return footprint_cost(cells, geometry[0], geometry[1], geometry[2], samples, x, y, yaw) == LETHAL
 
 
 @inner_kernel

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import brief_kernel, inner_kernel, kernel, plain_kernel
+from mbf_costmap_nav.kernels.costs import LETHAL
 
 SPARE_REACH = 0.5
 """How much larger the square is that is looked at once for many poses, in reaches of the footprint."""
@@ -47,7 +48,7 @@ def footprint_cost(
     Returns
     -------
     int
-        0..254, or OUTSIDE if a point is off the map and no cell is lethal.
+        FREE..LETHAL, or OUTSIDE if a point is off the map and no cell is lethal.
     """
     height, width = cells.shape
     c, s = np.cos(yaw) / resolution, np.sin(yaw) / resolution
@@ -60,9 +61,9 @@ def footprint_cost(
             outside = True
             continue
         cost = int(cells[iy, ix])
-        if cost == 254:
-            return 254
-        if worst < cost < 254:
+        if cost == LETHAL:
+            return LETHAL
+        if worst < cost < LETHAL:
             worst = cost
     return OUTSIDE if outside else worst
 
@@ -84,7 +85,7 @@ def first_lethal(
     for i in range(samples.shape[0]):
         ix = int(np.floor((cosine * samples[i, 0] - sine * samples[i, 1] + x - origin_x) / resolution))
         iy = int(np.floor((sine * samples[i, 0] + cosine * samples[i, 1] + y - origin_y) / resolution))
-        if 0 <= ix < width and 0 <= iy < height and cells[iy, ix] == 254:
+        if 0 <= ix < width and 0 <= iy < height and cells[iy, ix] == LETHAL:
             return ix, iy
     return -1, -1
 
@@ -114,7 +115,7 @@ def first_collision(
             clear_x, clear_y = x, y
             continue
         cost = footprint_cost(cells, resolution, origin_x, origin_y, samples, poses[i, 0], poses[i, 1], poses[i, 2])
-        if cost == 254:
+        if cost == LETHAL:
             return i
     return -1
 
@@ -137,7 +138,7 @@ def _square_is_clear(cells: NDArray[np.uint8], x: float, y: float, reach: float)
     for row in range(max(iy - wide, 0), min(iy + wide + 1, height)):
         lethal = np.uint8(0)
         for column in range(first, last):  # without a branch, so that it becomes vector code
-            lethal |= np.uint8(cells[row, column] == 254)
+            lethal |= np.uint8(cells[row, column] == LETHAL)
         if lethal != 0:
             return False
     return True
@@ -156,5 +157,5 @@ def collisions(
     touching = np.zeros(poses.shape[0], dtype=np.bool_)
     for i in range(poses.shape[0]):
         cost = footprint_cost(cells, resolution, origin_x, origin_y, samples, poses[i, 0], poses[i, 1], poses[i, 2])
-        touching[i] = cost == 254
+        touching[i] = cost == LETHAL
     return touching

@@ -6,9 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import kernel
+from mbf_costmap_nav.kernels.costs import (
+    FREE_STATE,
+    INSCRIBED,
+    INSCRIBED_STATE,
+    LETHAL_STATE,
+    OUTSIDE_STATE,
+    UNKNOWN,
+    UNKNOWN_STATE,
+)
 from mbf_costmap_nav.kernels.map.rasterisation import polygon_costs
 
-FREE, INSCRIBED, LETHAL, UNKNOWN, OUTSIDE = 0, 1, 2, 3, 4
 FloatArray = NDArray[np.float64]
 
 
@@ -34,14 +42,14 @@ def first_fitting_pose(
     candidate, yaw : int
         Indices of the pose; of the first one that reaches into unknown or out of the map if none fits; -1 without any.
     state : int
-        0 free, 1 inscribed, 2 lethal (nothing found), 3 unknown, 4 outside.
+        That of the pose, one of ``costs``; LETHAL_STATE if nothing was found.
     cost : int
         Highest cost under the footprint.
     """
-    fallback, fallback_yaw, fallback_state = -1, -1, LETHAL
+    fallback, fallback_yaw, fallback_state = -1, -1, LETHAL_STATE
     corners = np.empty_like(outline)
     for c in range(len(candidates)):
-        if cells[int(candidates[c, 1]), int(candidates[c, 0])] >= 253:
+        if cells[int(candidates[c, 1]), int(candidates[c, 0])] >= INSCRIBED:
             continue
         for k in range(len(yaws)):
             cosine, sine = np.cos(yaws[k]), np.sin(yaws[k])
@@ -52,7 +60,7 @@ def first_fitting_pose(
             if lethal > 0:
                 continue
             if covered >= 0 and unknown == 0:
-                return c, k, INSCRIBED if inscribed > 0 else FREE, highest
+                return c, k, INSCRIBED_STATE if inscribed > 0 else FREE_STATE, highest
             if fallback < 0:
-                fallback, fallback_yaw, fallback_state = c, k, OUTSIDE if covered < 0 else UNKNOWN
-    return fallback, fallback_yaw, fallback_state, 255 if fallback_state == UNKNOWN else 0
+                fallback, fallback_yaw, fallback_state = c, k, OUTSIDE_STATE if covered < 0 else UNKNOWN_STATE
+    return fallback, fallback_yaw, fallback_state, UNKNOWN if fallback_state == UNKNOWN_STATE else 0

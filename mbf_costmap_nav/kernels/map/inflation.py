@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import inner_kernel, kernel, plain_kernel
+from mbf_costmap_nav.kernels.costs import UNKNOWN
 
 LARGEST_RADIUS = 253
 """[cells] Column distances up to one more than the radius have to fit 8 bits, their squares 16."""
@@ -152,4 +153,4 @@ def _raise_costs(row: Cells, costs: Cells, unknown_from: np.uint8) -> None:
     """Raise cells to the costs; unknown, the largest byte, is replaced by costs from ``unknown_from`` on."""
     for x in range(np.uint64(row.size)):
         old, cost = row[x], costs[x]
-        row[x] = cost if old == 255 and cost >= unknown_from else max(old, cost)
+        row[x] = cost if old == UNKNOWN and cost >= unknown_from else max(old, cost)

@@ -14,17 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import inner_kernel, plain_kernel
+from mbf_costmap_nav.kernels.costs import LETHAL, UNKNOWN
 
-OUTSIDE_COST = 254
+OUTSIDE_COST = LETHAL
 """What lies off the map counts as lethal."""
 
 
 @inner_kernel
 def _cost_of_cell(cells: NDArray[np.uint8], unknown: int, ix: int, iy: int) -> int:
-    """Cost of a cell; ``unknown`` for one of cost 255."""
+    """Cost of a cell; ``unknown`` for one that is UNKNOWN."""
     if ix < 0 or iy < 0 or ix >= cells.shape[1] or iy >= cells.shape[0]:
         return OUTSIDE_COST
-    return int(cells[iy, ix]) if cells[iy, ix] < 255 else unknown
+    return int(cells[iy, ix]) if cells[iy, ix] < UNKNOWN else unknown
 
 
 @plain_kernel

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import inner_kernel, kernel
+from mbf_costmap_nav.kernels.costs import LETHAL
 from mbf_costmap_nav.kernels.map.footprint_cost import first_collision, footprint_cost
 from mbf_costmap_nav.kernels.map.path_poses import course_along, headed_poses
 
@@ -73,6 +74,6 @@ def _turn_collides(
     count = math.ceil(abs(turn) / step)
     for number in range(1, count + 1):
         heading = pose[2] + turn * (number / count)
-        if footprint_cost(cells, resolution, origin_x, origin_y, samples, pose[0], pose[1], heading) == 254:
+        if footprint_cost(cells, resolution, origin_x, origin_y, samples, pose[0], pose[1], heading) == LETHAL:
             return True
     return False

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import inner_kernel, kernel
+from mbf_costmap_nav.kernels.costs import INSCRIBED, LETHAL, UNKNOWN
 
 FloatArray = NDArray[np.float64]
 
@@ -100,7 +101,7 @@ def polygon_costs(cells: NDArray[np.uint8], corners: FloatArray) -> tuple[int, i
     covered : int
         Number of covered cells; -1 if a corner lies out of the grid (everything else is 0 then).
     lethal, inscribed, unknown : int
-        How many of them are 254, 253, 255.
+        How many of them are LETHAL, INSCRIBED, UNKNOWN.
     rest : int
         Sum of all other costs.
     highest : int
@@ -118,13 +119,13 @@ def polygon_costs(cells: NDArray[np.uint8], corners: FloatArray) -> tuple[int, i
                 continue
             cost = int(cells[y0 + row, x0 + column])
             covered += 1
-            if cost == 255:
+            if cost == UNKNOWN:
                 unknown += 1
                 continue
             highest = max(highest, cost)
-            if cost == 254:
+            if cost == LETHAL:
                 lethal += 1
-            elif cost == 253:
+            elif cost == INSCRIBED:
                 inscribed += 1
             else:
                 rest += cost
@@ -133,7 +134,7 @@ def polygon_costs(cells: NDArray[np.uint8], corners: FloatArray) -> tuple[int, i
 
 @kernel
 def blocked_under(cells: NDArray[np.uint8], corners: FloatArray, off_grid: bool) -> tuple[int, int]:
-    """How many of the cells a polygon covers are lethal (254), or off the grid if asked for, and how many it covers."""
+    """How many of the cells a polygon covers are lethal, or off the grid if asked for, and how many it covers."""
     height, width = cells.shape
     x0, y0, mask = rasterise_polygon(corners, (-(1 << 40), -(1 << 40), 1 << 40, 1 << 40))
     blocked, covered = 0, 0
@@ -145,7 +146,7 @@ def blocked_under(cells: NDArray[np.uint8], corners: FloatArray, off_grid: bool)
             covered += 1
             if ix < 0 or iy < 0 or ix >= width or iy >= height:
                 blocked += off_grid
-            elif cells[iy, ix] == 254:
+            elif cells[iy, ix] == LETHAL:
                 blocked += 1
     return blocked, covered
 
@@ -162,12 +163,9 @@ def fill_polygon(cells: NDArray[Any], corners: FloatArray, value: int) -> tuple[
     return x0, y0, x0 + mask.shape[1], y0 + mask.shape[0]
 
 
-UNKNOWN = 255
-
-
 @kernel
 def raise_discs(cells: NDArray[np.uint8], discs: NDArray[np.float64], values: NDArray[np.uint8]) -> None:
-    """Raise the cells whose middle lies in a disc to its value; unknown cells (255) take it, too.
+    """Raise the cells whose middle lies in a disc to its value; unknown cells take it, too.
 
     Parameters
     ----------

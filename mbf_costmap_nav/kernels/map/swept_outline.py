@@ -8,12 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import Count, kernel
+from mbf_costmap_nav.kernels.costs import (
+    INSCRIBED,
+    INSCRIBED_STATE,
+    LETHAL,
+    LETHAL_STATE,
+    OUTSIDE_STATE,
+    UNKNOWN,
+    UNKNOWN_STATE,
+)
 from mbf_costmap_nav.kernels.map.rasterisation import rasterise_polygon
 
 FloatArray = NDArray[np.float64]
 
-INSCRIBED_STATE, LETHAL_STATE, UNKNOWN_STATE, OUTSIDE_STATE = 1, 2, 3, 4
-"""Values of ``CellState``."""
 FAR = 1 << 40
 
 
@@ -75,8 +82,8 @@ def _add_states(cells: NDArray[np.uint8], corners: FloatArray, states: NDArray[n
                 states[line, 0] = OUTSIDE_STATE
                 continue
             cost = cells[iy, ix]
-            if cost == 255:
+            if cost == UNKNOWN:
                 states[line, 0] = max(states[line, 0], UNKNOWN_STATE)
-            elif cost >= 253:
-                state = LETHAL_STATE if cost == 254 else INSCRIBED_STATE
+            elif cost >= INSCRIBED:
+                state = LETHAL_STATE if cost == LETHAL else INSCRIBED_STATE
                 states[line, 0], states[line, 1] = max(states[line, 0], state), max(states[line, 1], state)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import inner_kernel, kernel, plain_kernel
+from mbf_costmap_nav.kernels.costs import FREE, LETHAL
 from mbf_costmap_nav.kernels.map.raytrace import cut_to_range, grow_touched
 
 Columns = NDArray[np.uint32]
@@ -158,7 +159,7 @@ def project_columns(
     cells: NDArray[np.uint8],
     box: tuple[int, int, int, int],
 ) -> None:
-    """Write what each column of a box amounts to: lethal (254), free (0) or ``unknown_value``.
+    """Write what each column of a box amounts to: LETHAL, FREE or ``unknown_value``.
 
     Parameters
     ----------
@@ -175,8 +176,8 @@ def project_columns(
         for x in range(box[0], box[2]):
             known = seen[y, x]
             if count_bits(marked[y, x]) > mark_threshold:
-                cells[y, x] = 254
+                cells[y, x] = LETHAL
             elif known == 0 or levels - count_bits(known) > unknown_threshold:
                 cells[y, x] = unknown_value
             else:
-                cells[y, x] = 0
+                cells[y, x] = FREE
