@@ -33,8 +33,6 @@ from mbf_costmap_nav.plugins import CostmapRecovery
 
 OFF_MAP = 256
 """Cost of a centre outside the map: more than that of any cell."""
-ATTEMPTS = 3
-"""How often a manoeuvre is searched: one may end a little short of its place, or be refused on the way."""
 
 
 class EscapeParameters(ManoeuvreParameters):
@@ -122,25 +120,20 @@ class EscapeRecovery(CostmapRecovery, ManoeuvreRecovery):
 
     # ------------------------------------------------------------------------------------- what is forbidden
     def _leave(self, request: RecoveryRequest) -> RecoveryResult:
-        """Drive the shortest manoeuvre to where all maps are free; search anew where it ends short or is refused."""
-        result, token = RecoveryResult(RecoveryOutcome.SUCCESS), request.cancel_token
-        for _ in range(ATTEMPTS):
-            begin = request.motion.pose()
+        """Drive the shortest manoeuvre to where all maps are free."""
+
+        def search(begin: Pose) -> list[Step] | RecoveryResult:
             maps = self._leaving(begin)
             if all(one.is_free for one in maps):
                 return RecoveryResult(RecoveryOutcome.SUCCESS)
-            steps = self._manoeuvre(maps, token)
-            if token.cancelled:
-                return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
-            if steps is None:
-                closed = "; ".join(one.reason for one in maps if not one.is_free)
-                longest = f"{self.parameters.max_distance:g} m"
-                text = f"no manoeuvre of {longest} leads to where the robot may stand: {closed}"
-                return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
-            result = self.drive_along(begin, steps, request)
-            if result.outcome not in (RecoveryOutcome.SUCCESS, RecoveryOutcome.IMPASSABLE):
-                break
-        return result
+            steps = self._manoeuvre(maps, request.cancel_token)
+            if steps is not None:
+                return steps
+            closed = "; ".join(one.reason for one in maps if not one.is_free)
+            text = f"no manoeuvre of {self.parameters.max_distance:g} m leads to where the robot may stand: {closed}"
+            return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
+
+        return self.drive_out(request, search)
 
     def _manoeuvre(self, maps: list[Leaving], token: CancelToken) -> list[Step] | None:
         """Shortest manoeuvre with room around the outline, or without where there is none."""

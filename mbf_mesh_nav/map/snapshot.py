@@ -54,6 +54,11 @@ class MeshSnapshot:
         for array in (self.costs, self.lethal, self.edge_weights):
             array.flags.writeable = False
 
+    @property
+    def untouchable(self) -> LethalArray:
+        """Vertices (V,) that no robot may touch, whatever the cost limit: lethal, or of infinite cost."""
+        return np.asarray(self.lethal | np.isposinf(self.costs))
+
     def blocked(self, cost_limit: float) -> LethalArray:
         """Vertices (V,) a plan with this limit does not touch: lethal, or of a cost that reaches it or is NaN."""
         blocked = self.costs < cost_limit

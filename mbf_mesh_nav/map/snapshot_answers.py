@@ -191,9 +191,7 @@ class SnapshotAnswers(OutlinedMap):
         place = self.locate_one(pose.position, SURFACE_DISTANCE)
         if place is None:
             return None
-        snapshot = self.snapshot()
-        lethal = np.asarray(snapshot.lethal | np.isposinf(snapshot.costs))
-        return nearest_of(self.topology, place, pose, within, lethal)
+        return nearest_of(self.topology, place, pose, within, self.snapshot().untouchable)
 
     def heights_below(self, points: FloatArray) -> FloatArray:
         """Height (n,) [m] of the first surface straight below each point (n, 3) [m], nan where there is none."""

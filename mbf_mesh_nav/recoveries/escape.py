@@ -22,7 +22,7 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses, arc_to
 from mbf_abstract.geometry.tangent_plane import ground_distance
 from mbf_abstract.maps.controllers.failures import obstacle_text
-from mbf_abstract.maps.manoeuvres import LEAST_RADIUS, find_manoeuvre
+from mbf_abstract.maps.manoeuvres import LEAST_RADIUS, Step, find_manoeuvre
 from mbf_abstract.maps.recoveries.manoeuvre_recovery import ManoeuvreParameters, ManoeuvreRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import parameter
@@ -42,8 +42,6 @@ from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, search_graph,
 
 LOOK_STEP = 0.05
 """Distance [m] of the places that a motion in curves is looked at."""
-ATTEMPTS = 3
-"""How often a manoeuvre is searched: one may end a little short of its place, or be refused on the way."""
 
 
 class EscapeParameters(ManoeuvreParameters):
@@ -120,7 +118,7 @@ class EscapeRecovery(MeshRecovery, ManoeuvreRecovery):
             now = mesh_map.snapshot()
             if path is not None:
                 path.tracker.update(pose.position)
-                if not path.is_open(_lethal(now) & ~own_patch, now.blocked(p.cost_limit)):
+                if not path.is_open(now.untouchable & ~own_patch, now.blocked(p.cost_limit)):
                     here = mesh_map.locate_one(pose.position, SURFACE_DISTANCE)
                     path = None if here is None else self._escape_path(here, own_patch, request)
             if path is None:
@@ -134,31 +132,31 @@ class EscapeRecovery(MeshRecovery, ManoeuvreRecovery):
         return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
 
     def _leave_in_curves(self, own_patch: BoolArray, radius: float, request: RecoveryRequest) -> RecoveryResult:
-        """Drive the shortest manoeuvre with curves of a radius [m] at least; search anew where it ends short."""
-        p, mesh_map, token, self._own_patch = self.parameters, self.mesh_map, request.cancel_token, own_patch
-        result = self._nowhere("by a manoeuvre")
-        for _ in range(ATTEMPTS):
-            begin = self.on_map(request.motion.pose())
+        """Drive the shortest manoeuvre with curves of a radius [m] at least."""
+        mesh_map, token, self._own_patch = self.mesh_map, request.cancel_token, own_patch
+
+        def search(pose: Pose) -> list[Step] | RecoveryResult:
+            begin = self.on_map(pose)
             spot = mesh_map.locate_one(begin.position, SURFACE_DISTANCE)
             if spot is None:
-                break
+                return self._nowhere("by a manoeuvre")
             distances, _, safe = self._reached(spot, own_patch, request)
             if safe[nearest_corner(mesh_map, spot)]:
                 return RecoveryResult(RecoveryOutcome.SUCCESS, "reached a safe surface")
-            maps = LeavingSurface(mesh_map, begin, np.isfinite(distances), safe & np.isfinite(distances))
-            steps = find_manoeuvre(maps.may_pass, maps.left, p.max_distance, radius, lambda: token.cancelled)
-            if token.cancelled:
-                return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
-            if steps is None:
-                return self._nowhere("by a manoeuvre")
-            result = self.drive_along(begin, steps, request)
-            if result.outcome not in (RecoveryOutcome.SUCCESS, RecoveryOutcome.IMPASSABLE):
-                break
-        return result
+            surface = LeavingSurface(mesh_map, begin, np.isfinite(distances), safe & np.isfinite(distances))
+            longest = self.parameters.max_distance
+            steps = find_manoeuvre(surface.may_pass, surface.left, longest, radius, lambda: token.cancelled)
+            return self._nowhere("by a manoeuvre") if steps is None else steps
+
+        return self.drive_out(request, search)
 
     def obstacle_on_manoeuvre(self, pose: Pose, command: Twist) -> str:
         """Lethal surface that the robot's centre would come to, but for what it stood on, on the current map."""
-        closed, duration, there = _lethal(self.mesh_map.snapshot()), self.parameters.check_ahead_time, self.on_map(pose)
+        closed, duration, there = (
+            self.mesh_map.snapshot().untouchable,
+            self.parameters.check_ahead_time,
+            self.on_map(pose),
+        )
         surface = LeavingSurface(self.mesh_map, there, ~closed | self._own_patch, closed)
         motion = command.vx, command.vy, command.wz, duration, min(LOOK_STEP / max(command.speed, 1e-6), duration)
         ahead = map(tuple, arc_poses((0.0, 0.0, 0.0), *motion).tolist())
@@ -182,7 +180,7 @@ class EscapeRecovery(MeshRecovery, ManoeuvreRecovery):
 
     def _patch_below(self, spot: SurfacePoint, snapshot: MeshSnapshot, flag: FlagArray) -> BoolArray:
         """Lethal vertices (V,) connected to the one the robot stands on; none if it stands beside them."""
-        lethal = _lethal(snapshot)
+        lethal = snapshot.untouchable
         if not lethal[nearest_corner(self.mesh_map, spot)]:
             return np.zeros_like(lethal)
         return np.isfinite(self._propagate(spot, ~lethal, flag)[0])
@@ -211,7 +209,7 @@ class EscapeRecovery(MeshRecovery, ManoeuvreRecovery):
         beside_blocked = blocked[mesh_map.edges].any(axis=1)
         safe = ~blocked
         safe[mesh_map.edges[beside_blocked].ravel()] = False
-        return *self._propagate(spot, _lethal(snapshot) & ~own_patch, request.cancel_token.flag), safe
+        return *self._propagate(spot, snapshot.untouchable & ~own_patch, request.cancel_token.flag), safe
 
     def _propagate(self, spot: SurfacePoint, closed: BoolArray, flag: FlagArray) -> tuple[Float32Array, IntArray]:
         """Lengths of the paths from the robot to all vertices but the ``closed`` ones, and their predecessors."""
@@ -221,8 +219,3 @@ class EscapeRecovery(MeshRecovery, ManoeuvreRecovery):
         step = threshold_step(mesh_map)
         propagate_distances(graph, distances, predecessors, seeds, step, NO_TARGETS, NO_OFFSETS, flag)
         return distances, predecessors
-
-
-def _lethal(snapshot: MeshSnapshot) -> BoolArray:
-    """Vertices (V,) that no robot may touch, whatever the cost limit."""
-    return np.asarray(snapshot.lethal | np.isposinf(snapshot.costs))

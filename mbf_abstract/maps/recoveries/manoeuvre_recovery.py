@@ -11,7 +11,7 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
+from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery, ended_by_others
 from mbf_abstract.maps.manoeuvres import PlanarPose, Step
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import parameter
@@ -19,6 +19,8 @@ from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 
 LOOKAHEAD = 0.25  # m to the point of the manoeuvre that is steered to
 END_REACHED, HEADING_REACHED = 0.04, 0.05  # m, rad
+ATTEMPTS = 3
+"""How often a manoeuvre out is searched: one may end a little short of its place, or be refused on the way."""
 
 
 class ManoeuvreParameters(GuardedMotionParameters):
@@ -37,6 +39,29 @@ class ManoeuvreRecovery(GuardedRecovery):
     def manoeuvre_speed(self) -> float:
         """How fast [m/s] a manoeuvre is driven, forward and backward."""
         return self.parameters.speed
+
+    def drive_out(
+        self, request: RecoveryRequest, search: Callable[[Pose], list[Step] | RecoveryResult]
+    ) -> RecoveryResult:
+        """Drive one manoeuvre after the other, ``ATTEMPTS`` at most, until there is a result instead of a next one.
+
+        Parameters
+        ----------
+        search : callable
+            Answers, for the robot's pose, the steps from there to where it may stand; or a result where it may stand
+            already, and where no steps lead out.
+        """
+        result = RecoveryResult(RecoveryOutcome.SUCCESS)
+        for _ in range(ATTEMPTS):
+            begin = request.motion.pose()
+            steps = search(begin)
+            if isinstance(steps, RecoveryResult):
+                given_up = request.cancel_token.cancelled and not steps.success
+                return ended_by_others(request.cancel_token) if given_up else steps
+            result = self.drive_along(begin, steps, request)
+            if result.outcome not in (RecoveryOutcome.SUCCESS, RecoveryOutcome.IMPASSABLE):
+                break
+        return result
 
     def drive_along(
         self,

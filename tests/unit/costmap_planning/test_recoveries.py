@@ -5,15 +5,17 @@ import math
 import numpy as np
 import pytest
 
+from mbf_abstract.maps.manoeuvres import Step
 from mbf_abstract.maps.recoveries.back_up import BackUpRecovery
 from mbf_abstract.maps.recoveries.clear import ClearRecovery
 from mbf_abstract.maps.recoveries.drive_on_heading import DriveOnHeadingRecovery
+from mbf_abstract.maps.recoveries.manoeuvre_recovery import ATTEMPTS, ManoeuvreParameters, ManoeuvreRecovery
 from mbf_abstract.maps.recoveries.move_away import MoveAwayRecovery
 from mbf_abstract.maps.recoveries.relax import RelaxRecovery
 from mbf_abstract.maps.recoveries.rotate import RotateRecovery
 from mbf_abstract.maps.recoveries.wait import WaitRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
-from mbf_abstract.plugins import RecoveryRequest
+from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.motion_check import blocked_cells
@@ -117,6 +119,46 @@ def test_cancel_while_moving_stops_the_robot(run, recovery):
     assert result.outcome == RecoveryOutcome.CANCELED
     moving, stopped = robot.commands
     assert not moving.is_stopped() and stopped.is_stopped()
+
+
+class Searching(ManoeuvreRecovery):
+    """Leaves by manoeuvres that a test gives."""
+
+    Parameters = ManoeuvreParameters
+
+    def recover(self, request):
+        self.searches = []
+        return self.drive_out(request, lambda begin: self.searches.append(begin) or self.answer(request.cancel_token))
+
+
+def test_a_manoeuvre_out_is_searched_a_few_times_and_a_result_ends_it(run):
+    class Short(Searching):
+        def answer(self, token):
+            return [Step(1, ((0.1, 0.0, 0.0), (0.2, 0.0, 0.0)), 0.2)]
+
+    result, robot, plugin = run(Short)
+    assert result.success and len(plugin.searches) == ATTEMPTS
+    assert robot.state[0] == pytest.approx(ATTEMPTS * 0.2, abs=0.05 * ATTEMPTS)
+
+    class Nowhere(Searching):
+        def answer(self, token):
+            return RecoveryResult(RecoveryOutcome.IMPASSABLE, "nowhere")
+
+    result, _, plugin = run(Nowhere)
+    assert (result.outcome, result.message, len(plugin.searches)) == (RecoveryOutcome.IMPASSABLE, "nowhere", 1)
+
+
+@pytest.mark.parametrize(
+    ("found", "end"),
+    [(RecoveryOutcome.SUCCESS, RecoveryOutcome.SUCCESS), (RecoveryOutcome.IMPASSABLE, RecoveryOutcome.CANCELED)],
+)
+def test_a_search_that_is_cut_short_by_a_cancel_has_not_found_that_nothing_leads_out(run, found, end):
+    class CutShort(Searching):
+        def answer(self, token):
+            token.cancel("no longer wanted")
+            return RecoveryResult(found)
+
+    assert run(CutShort)[0].outcome == end
 
 
 @pytest.mark.parametrize(
