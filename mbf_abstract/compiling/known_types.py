@@ -21,6 +21,8 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NopythonTypeInference
 
+from mbf_abstract.compiling.calls_in_place import code_in_place, known_signature
+
 INHERITED = ("nrt", "fastmath", "error_model")
 """Options of a kernel that numba compiles its own functions with; one with other options is a function of its own."""
 _known: WeakKeyDictionary[Any, dict[tuple[str, ...], dict[Any, Any]]] = WeakKeyDictionary()
@@ -47,7 +49,8 @@ class KnownTypes:
             return self._context.resolve_function_type(func, args, kws)
         key = (func, tuple(args), tuple(kws.items()))
         if self._found.get(key) is None:
-            self._found[key] = self._context.resolve_function_type(func, args, kws)
+            in_place = known_signature(func, args, kws)
+            self._found[key] = in_place or self._context.resolve_function_type(func, args, kws)
         return self._found[key]
 
     def resolve_value_type(self, val: Any) -> Any:
@@ -75,7 +78,17 @@ class KnownTypeInference(NopythonTypeInference):  # type: ignore[misc]
 
 
 class KnownOperators(Lower):  # type: ignore[misc]
-    """numba's step from its own code to LLVM's, which takes the types of ``a + b`` of numbers as they were found."""
+    """numba's step from its own code to LLVM's, which takes the types of ``a + b`` of numbers as they were found.
+
+    Calls that have a ``known_signature`` are made in place.
+    """
+
+    def _lower_call_normal(self, fnty: Any, expr: Any, signature: Any) -> Any:
+        if signature.pysig is not None or known_signature(fnty, signature.args, ()) != signature:
+            return super()._lower_call_normal(fnty, expr, signature)
+        variables = [*expr.args, *dict(expr.kws).values()]
+        values = [self._cast_var(variable, kind) for variable, kind in zip(variables, signature.args, strict=True)]
+        return code_in_place(self.context, self.builder, fnty, signature, values)
 
     def lower_binop(self, resty: Any, expr: Any, op: Any) -> Any:
         """Code of an operation of two operands.

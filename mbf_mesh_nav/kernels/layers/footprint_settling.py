@@ -101,7 +101,7 @@ def vertices_below_the_belly(surface: Surface, centre: int, radius: float, seen:
     """
     vertices, offsets = surface.vertices, surface.neighbour_offsets
     seen[centre] = centre
-    size = Count(0)
+    size: int = Count(0)
     reader = Count(-1)
     while reader < size:
         vertex = Count(centre) if reader < 0 else Count(members[reader])
@@ -117,7 +117,7 @@ def vertices_below_the_belly(surface: Surface, centre: int, radius: float, seen:
             if dx * dx + dy * dy < radius * radius:
                 members[size] = other
                 size += 1
-    return int(size)
+    return size
 
 
 @inner_kernel

@@ -87,13 +87,17 @@ def propagate_distances(
     far = np.empty(len(distances) + 1, dtype=np.int32)
     state = np.empty(len(distances), dtype=np.uint8)
     fill(state, Count(0))
-    keys = distances if towards is None else np.empty(len(distances), dtype=np.float32)  # valid in the far list
+    if towards is None:
+        keys = distances  # valid in the far list
+    else:
+        keys = np.empty(len(distances), dtype=np.float32)
+        vertices, goal = towards
     head, tail, far_count = Index(0), Index(0), Index(0)
     for seed in seeds:
         if state[seed] == UNQUEUED:
             state[seed] = IN_FAR
             if towards is not None:
-                keys[seed] = distances[seed] + straight_line_bound(towards[0], Index(seed), towards[1])
+                keys[seed] = distances[seed] + straight_line_bound(vertices, Index(seed), goal)
             far[far_count] = seed
             far_count += ONE
     threshold, step = np.float32(0.0), np.float32(threshold_step)
@@ -139,7 +143,7 @@ def propagate_distances(
                         distances[neighbour] = key = candidate
                         predecessors[neighbour] = vertex
                         if towards is not None:
-                            key = candidate + straight_line_bound(towards[0], neighbour, towards[1])
+                            key = candidate + straight_line_bound(vertices, neighbour, goal)
                             keys[neighbour] = key
                         # To one list or the other, or to none: written behind both, and counted where it belongs.
                         is_near, listed = key < threshold, state[neighbour]

@@ -91,7 +91,8 @@ def write_encounters(
     if len(objects) == 0:
         return
     back, front, right, left, radius = box[0], box[1], box[2], box[3], box[4]
-    extent = np.sqrt(max(-back, front) ** 2 + max(-right, left) ** 2) + radius + np.float32(margin)
+    length, width = max(-back, front), max(-right, left)  # as far as the outline reaches from the centre
+    extent = np.sqrt(length * length + width * width) + radius + np.float32(margin)
     per_margin, zero, one = np.float32(1.0 / margin), np.float32(0.0), np.float32(1.0)
     cosine_now, sine_now = np.float32(np.cos(yaw)), np.float32(np.sin(yaw))
     is_disc = back == zero and front == zero and right == zero and left == zero
