@@ -45,11 +45,14 @@ In the tables, a default of **required** must be given. Of a range, `[` includes
 running* says whether a change takes effect on goals that run already; otherwise it is read when a goal starts or when
 the server is made.
 
-Change values while the server runs by a call, all of its values or none: `server.set_parameters(...)`,
-`server.set_plugin_parameters(kind, name, ...)`, and on every map `set_map_parameters("local_costmap", max_age=1.0)`,
-`set_layer_parameters("global_costmap.inflation", inflation_radius=0.8)` and `set_footprint(...)` with corners or the
-radius of a round robot (on a mesh: a radius, and the radii of its layers change by as much). The map shows it after its
-next update.
+While the server runs, its methods change values. A call changes all of its values or, where one is wrong, none:
+
+- `server.set_parameters(...)` and `set_plugin_parameters(kind, name, ...)`;
+- `set_map_parameters("local_costmap", max_age=1.0)`;
+- `set_layer_parameters("global_costmap.inflation", inflation_radius=0.8)`;
+- `set_footprint(...)` with corners, or a radius; a mesh takes a radius, and those of its layers change by as much.
+
+A map shows a change after its next update.
 """
 
 BACKENDS = {
