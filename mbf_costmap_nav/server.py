@@ -78,6 +78,10 @@ class CostmapNavigationServer(MapServer):
         "local_costmap": CostmapParameters,
     }
     map_names: ClassVar[Sequence[str]] = ("local", "global")
+    car_controllers: ClassVar[Sequence[str]] = (
+        "costmap.regulated_pure_pursuit",
+        "costmap.mppi with motion_model: ackermann",
+    )
 
     global_costmap: LayeredCostmap
     local_costmap: LayeredCostmap

@@ -76,6 +76,7 @@ class MeshNavigationServer(MapServer):
     backend: ClassVar[str] = "mesh"
     map_type = MeshMap
     config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {"mesh_map": MeshMapParameters}
+    car_controllers: ClassVar[Sequence[str]] = ("mesh.mppi with motion_model: ackermann",)
 
     read_mesh = staticmethod(read_mesh)
     """The reader of mesh files, for packages that know this one by its server only."""

@@ -112,6 +112,8 @@ class MapInterface(PluginHost):
         heights = self.ground_heights(x, y)
         return Pose.planar(x, y, yaw, heights[0] if heights else 0.0, frame_id=self.config.parameters.global_frame)
 
+    car_controllers: ClassVar[Sequence[str]] = ()
+    """The controllers of this map that suit a car, each as a note on one that does not names it."""
     map_view_type: ClassVar[type[GridView] | type[MeshView] | None] = None
     """What all of ``map_views`` look like; None if this server has nothing to show."""
 

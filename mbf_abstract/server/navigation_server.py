@@ -102,7 +102,7 @@ class AbstractNavigationServer(MapInterface):
             f"left out: optional {skipped.kind.name.lower()} {skipped.name!r}: {skipped.reason}"
             for skipped in self.config.skipped
         )
-        return (*left_out, *self.map_notes, *notes_on_plugins(self.plugins, self.runtime))
+        return (*left_out, *self.map_notes, *notes_on_plugins(self.plugins, self.runtime, self.car_controllers))
 
     # --------------------------------------------------------------------------------------- parameters
     def set_parameters(self, **changes: Any) -> None:

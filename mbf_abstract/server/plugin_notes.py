@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from mbf_abstract.actions.meetings import own_distance
 from mbf_abstract.event_bus import EventBus
@@ -39,13 +39,13 @@ class MapNotes:
         return kept.of_kind(EventKind.MAP) if kept else ()
 
 
-def notes_on_plugins(plugins: PluginTable, runtime: Runtime) -> Iterator[str]:
-    """Yield a note for every setting that can not work as it is."""
-    yield from _curve_notes(plugins, runtime.gate.limits.min_turning_radius)
+def notes_on_plugins(plugins: PluginTable, runtime: Runtime, car_controllers: Sequence[str]) -> Iterator[str]:
+    """Yield a note for every setting that can not work as it is; the controllers are those of the map for cars."""
+    yield from _curve_notes(plugins, runtime.gate.limits.min_turning_radius, car_controllers)
     yield from _right_of_way_notes(plugins, runtime)
 
 
-def _curve_notes(plugins: PluginTable, tightest: float) -> Iterator[str]:
+def _curve_notes(plugins: PluginTable, tightest: float, car_controllers: Sequence[str]) -> Iterator[str]:
     """Plugins whose curves are tighter than the robot's radius [m]."""
     for kind in (PluginKind.PLANNER, PluginKind.CONTROLLER):
         for plugin in plugins.all_of(kind):
@@ -54,7 +54,9 @@ def _curve_notes(plugins: PluginTable, tightest: float) -> Iterator[str]:
             if radius is not None and 0.0 < radius < tightest:
                 yield f"{name}: min_turning_radius {radius:g} m is tighter than the robot's {tightest:.2f} m"
             if tightest > 0.0 and getattr(plugin.instance, "turns_on_the_spot", False):
-                yield f"{name} turns on the spot, which the robot cannot: its tightest curve is {tightest:.2f} m"
+                suited = f"; {' or '.join(car_controllers)} suits it" if car_controllers else ""
+                spot = f"{name} turns on the spot, which the robot cannot"
+                yield f"{spot}: its tightest curve is {tightest:.2f} m{suited}"
 
 
 def _right_of_way_notes(plugins: PluginTable, runtime: Runtime) -> Iterator[str]:

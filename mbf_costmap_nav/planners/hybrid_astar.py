@@ -30,23 +30,18 @@ from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP
 from mbf_costmap_nav.kernels.car.joints import HEADINGS
 from mbf_costmap_nav.kernels.map.path_poses import yaw_quaternions
-from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND
-from mbf_costmap_nav.planning.car_search import TOO_WIDE, CarLeg, Driving, search_drive
+from mbf_costmap_nav.kernels.search.grid_search import FOUND
+from mbf_costmap_nav.planning.car_search import LEAST_STATES, STATES_PER_CELL, CarLeg, Driving, search_plan
 from mbf_costmap_nav.planning.car_world import CarWorkspace, CarWorld
 from mbf_costmap_nav.planning.grid_planning import check_tolerance, marked_if_never_fits, marked_if_permanent, off_map
 from mbf_costmap_nav.planning.path_assembly import heights_along
 from mbf_costmap_nav.planning.permanent_walls import is_in_walls, is_permanently_too_narrow, touches_walls
-from mbf_costmap_nav.planning.widest_disc import widest_disc
 from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
 
 FloatArray = NDArray[np.float64]
 
 DEFAULT_RADIUS = 0.5
 """Radius [m] of the tightest curve where neither the parameters nor the robot give one."""
-
-
-ROOMY_STATES = 200_000
-"""A path with some room to spare is searched with at most so many states, before one that only fits."""
 
 OVER_BORDER = "part of its outline would be off the map"
 
@@ -67,9 +62,10 @@ class HybridAStarParameters(PluginParameters):
     reverse_penalty: float = parameter(2.0, "Factor on the length driven backward.", ge=1.0, le=100.0)
     change_penalty: float = parameter(0.3, "Cost of a change of direction.", unit="m", ge=0.0, le=100.0)
     turning_penalty: float = parameter(1.05, "Factor on the length of curves.", ge=1.0, le=100.0)
-    max_states: int = parameter(
-        5_000_000,
-        "Give up after so many states, of some 100 bytes each; patience ends most searches before.",
+    max_states: int | None = parameter(
+        None,
+        "Give up after so many states, of some 100 bytes and 3 microseconds each; absent = 600,000, or 800 for each "
+        "cell of a long way.",
         ge=100,
         le=100_000_000,
     )
@@ -142,15 +138,11 @@ class HybridAStarPlanner(CostmapPlanner):
             if end is None:
                 return None
             goal = Pose((*world.costmap.cell_to_world(*end), goal.z), goal.orientation, goal.frame_id, goal.stamp)
-        # The dearer poses change which states a bin keeps, so a passage hardly wider than the robot may be missed.
-        few = replace(self._driving(), max_states=min(ROOMY_STATES, self.parameters.max_states))
-        for driving, ground in ((few, world.ground(roomy=True)), (self._driving(), None)):
-            leg = search_drive(world, driving, start, goal, wanted=wanted, tolerance=tolerance, ground=ground)
-            if leg.status in (FOUND, CANCELED, TOO_WIDE):
-                break
-        return leg
+        driving = self._driving(world.cost_of_way(from_start, goal))
+        return search_plan(world, driving, start, goal, wanted=wanted, tolerance=tolerance)
 
-    def _driving(self) -> Driving:
+    def _driving(self, cost_of_way: float) -> Driving:
+        """How the car drives; the cost [cells] is that of the centre's way."""
         p = self.parameters
         return Driving(
             radius=self.turning_radius,
@@ -159,7 +151,7 @@ class HybridAStarPlanner(CostmapPlanner):
             reverse_penalty=p.reverse_penalty,
             change_penalty=p.change_penalty,
             turning_penalty=p.turning_penalty,
-            max_states=p.max_states,
+            max_states=p.max_states or max(LEAST_STATES, math.ceil(STATES_PER_CELL * cost_of_way)),
         )
 
     def _no_path(
@@ -172,16 +164,17 @@ class HybridAStarPlanner(CostmapPlanner):
             return PlanResult(GetPathOutcome.BLOCKED_GOAL, text + self._closed_by(goal))
         if leg is None:
             return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no path {ends}, not even for a point robot")
-        if leg.status == TOO_WIDE:
-            width = 2.0 * widest_disc(world.footprint)[2]
-            text = f"no path {ends}: no way there is as wide as the robot, {width:.2f} m"
+        if leg.narrow is not None:
             is_permanent = is_permanently_too_narrow(self.costmap, start, goal, tolerance)
+            text = f"no path {ends}: {leg.narrow.text}"
             text += " between the walls of the static map" if is_permanent else ""
             return PlanResult(GetPathOutcome.NO_PATH_FOUND, text, permanent=is_permanent)
+        stuck = f"got no farther than ({leg.stuck[0]:.2f}, {leg.stuck[1]:.2f})"
         if leg.status == GAVE_UP:
-            text = f"no path {ends} within {leg.states} states; there may be one, see max_states"
+            text = f"no path {ends} within {leg.states} states, see max_states: the robot {stuck}"
             return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)
-        return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no drivable path {ends}, all {leg.states} states were tried")
+        text = f"no drivable path {ends}, all {leg.states} states were tried: the robot {stuck}"
+        return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)
 
     def _marked_at_border(self, failure: PlanResult, world: CarWorld, goal: Pose, tolerance: float) -> PlanResult:
         """A failure; permanent where, wherever the path may end, the outline would hang over a border that stays."""

@@ -4,13 +4,15 @@ When to use: by ``costmap.hybrid_astar``, and by ``manoeuvres`` for pieces of ot
 that fit everywhere at every heading; a search over cells is 10 to 100 times faster.
 
 Bins of two cells come first, for an eighth of the states; then finer ones, for tight places. After a long search that
-finds nothing it is looked whether any way to the goal is as wide as the robot.
+finds nothing it is looked whether any way to the goal is wide enough for the robot. ``search_plan`` shares the states
+that a plan may cost among the sizes of the bins: where a car gets round a corner that hardly lets it pass, small bins
+show it with few states, however many large ones a search of the rooms before and behind it would take.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +23,9 @@ from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP
 from mbf_costmap_nav.kernels.car.joints import HEADINGS
 from mbf_costmap_nav.kernels.car.motion_primitives import Car
 from mbf_costmap_nav.kernels.car.shorter_drive import shortened
-from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FOUND
 from mbf_costmap_nav.planning.car_world import CarWorld
-from mbf_costmap_nav.planning.widest_disc import disc_gets_there
+from mbf_costmap_nav.planning.passage import TooNarrow, too_narrow
 
 FloatArray = NDArray[np.float64]
 
@@ -32,7 +34,12 @@ CELLS_OF_BINS = (2.0, 1.0, 0.5, 0.25)
 STATES_THAT_SHOW = 20_000
 """After so many states in bins of a cell or less finer ones are not tried: there is no path."""
 TOO_WIDE = 5
-"""Further state of a finished search: no way to the goal is as wide as the robot; a state near by may be reached."""
+"""Further state of a finished search: no way to the goal is wide enough for the robot; a state near by may be
+reached."""
+LEAST_STATES, STATES_PER_CELL = 600_000, 800
+"""A plan may cost so many states by default, or so many for each cell of the way of the centre alone."""
+ROOMY_SHARE, SHARE = 4, 6
+"""A quarter of the states are for paths with some room to spare, a sixth for each size of the bins without."""
 
 
 @dataclass(frozen=True)
@@ -82,13 +89,17 @@ class Driving:
 class CarLeg:
     """Result of a search between two poses: ``status`` of the kernel or TOO_WIDE, and poses (n, 3).
 
-    Without poses there is no path. The cost [m] is weighted; ``states`` were made.
+    Without poses there is no path. The cost [m] is weighted; ``states`` were made. Without a path it came as far as
+    ``stuck`` (x, y) [m]. ``narrow``: why no way is wide enough. ``is_known``: whether that was asked.
     """
 
     status: int
     poses: FloatArray
     cost: float
     states: int
+    stuck: tuple[float, float] = (0.0, 0.0)
+    narrow: TooNarrow | None = None
+    is_known: bool = False
 
 
 def search_drive(
@@ -101,6 +112,7 @@ def search_drive(
     tolerance: float = 0.0,
     bins: tuple[float, ...] = CELLS_OF_BINS,
     ground: Ground | None = None,
+    is_known: bool = False,
 ) -> CarLeg:
     """Search from a start to a goal at which the robot fits; finer and finer until there is a path.
 
@@ -112,22 +124,65 @@ def search_drive(
         Sides of the bins [cells] to try in order.
     ground : Ground, optional
         ``world.ground()``, where it is known already.
+    is_known : bool
+        Whether it is known that some way is wide enough.
     """
     wanted = goal if wanted is None else wanted
     ground = world.ground() if ground is None else ground
-    states = made = 0
+    states, made, narrow, places = 0, 0, None, []
     for cells in bins:
         if cells < 1.0 and made > STATES_THAT_SHOW:
             break
         car = driving.car(world.costmap.resolution, cells)
-        status, poses, cost, made = world.drive(ground, car, start, goal, wanted, tolerance, driving.max_states)
+        status, poses, cost, made, stuck = world.drive(ground, car, start, goal, wanted, tolerance, driving.max_states)
         states += made
-        if status not in (FOUND, CANCELED) and made > STATES_THAT_SHOW:
-            around = 0.0 if len(poses) else tolerance
-            if not disc_gets_there(world.costmap, world.footprint, start, wanted, around):
-                status = TOO_WIDE
+        places.append((float(stuck[0]), float(stuck[1])))  # small bins do not get far with their states
+        if status not in (FOUND, CANCELED) and made > STATES_THAT_SHOW and not is_known:
+            is_known, around = True, 0.0 if len(poses) else tolerance
+            narrow = too_narrow(world.costmap, world.footprint, start, wanted, around)
+            status = TOO_WIDE if narrow else status
         if status in (FOUND, GAVE_UP, CANCELED, TOO_WIDE):
             break
     if status == FOUND:
         poses, cost = shortened(ground, car, poses, world.grid.token.flag)
-    return CarLeg(status, poses, cost, states)
+    return CarLeg(status, poses, cost, states, places[0], narrow, is_known)
+
+
+def search_plan(
+    world: CarWorld, driving: Driving, start: Pose, goal: Pose, *, wanted: Pose, tolerance: float
+) -> CarLeg:
+    """Search with room to spare, then without, in finer and finer bins; ``driving.max_states`` are for all of them.
+
+    The other arguments are those of ``search_drive``.
+    """
+    limit = driving.max_states
+    tries: list[tuple[int, tuple[float, ...], Ground]]
+    tries = [(limit // ROOMY_SHARE, CELLS_OF_BINS, world.ground(roomy=True))]
+    # The dearer poses change which states a bin keeps, so a passage hardly wider than the robot may be missed.
+    tries += [(limit // SHARE, (cells,), world.ground()) for cells in CELLS_OF_BINS]
+    leg, states = CarLeg(EXHAUSTED, np.empty((0, 3)), 0.0, 0), 0
+    for share, bins, ground in tries:
+        fewer, before = replace(driving, max_states=max(share, 1)), leg
+        leg = search_drive(
+            world,
+            fewer,
+            start,
+            goal,
+            wanted=wanted,
+            tolerance=tolerance,
+            bins=bins,
+            ground=ground,
+            is_known=before.is_known,
+        )
+        leg, states = replace(leg, stuck=before.stuck if states else leg.stuck), states + leg.states
+        if leg.status in (FOUND, CANCELED, TOO_WIDE):
+            break
+        if len(before.poses) and not len(leg.poses):
+            leg = replace(leg, status=before.status, poses=before.poses, cost=before.cost)
+        elif before.status == GAVE_UP and not len(leg.poses):
+            leg = replace(leg, status=GAVE_UP)
+        if bins == (1.0,) and leg.status == EXHAUSTED and leg.states > STATES_THAT_SHOW:
+            break
+    if leg.status == EXHAUSTED and not leg.is_known:
+        leg = replace(leg, narrow=too_narrow(world.costmap, world.footprint, start, wanted, tolerance))
+    return replace(leg, states=states)

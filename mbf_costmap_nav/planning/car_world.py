@@ -147,19 +147,23 @@ class CarWorld:
         (records, buckets), touched = grid.memory(new_search_memory)
         return search(grid.padded, first, -1, 0.0, True, False, grid.token.flag, records, touched, buckets)[1]
 
+    def cost_of_way(self, costs: NDArray[np.float32], goal: Pose) -> float:
+        """Cost [cells] of the centre's way to a pose among the costs of ``reached`` or ``field``."""
+        return float(costs[self._cell(goal)])
+
     def _cell(self, pose: Pose) -> int:
         """Flat padded index of a pose's cell."""
         return self.grid.index(self.grid.cell_of(pose))
 
     def drive(
         self, ground: Ground, car: Car, start: Pose, goal: Pose, wanted: Pose, tolerance: float, max_states: int
-    ) -> tuple[int, FloatArray, float, int]:
+    ) -> tuple[int, FloatArray, float, int, FloatArray]:
         """Call ``hybrid_search`` with the fields of costs from both ends in the workspace's memory."""
         grid, workspace = self.grid, self.workspace
         memory = _field_memory(grid, workspace.from_start), _field_memory(grid, workspace.from_goal)
         ends, cells = (planar(start), planar(goal)), (self._cell(start), self._cell(goal))
         flag = grid.token.flag
-        answer: tuple[int, FloatArray, float, int] = hybrid_search(
+        answer: tuple[int, FloatArray, float, int, FloatArray] = hybrid_search(
             ground, car, ends, cells, memory, planar(wanted), tolerance, max_states, flag
         )
         if flag[0] != 0:  # set while the records were written, it left some of them out

@@ -16,7 +16,8 @@ from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN, Costmap
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.map.pose_checks import find_valid_pose
-from mbf_costmap_nav.planning.widest_disc import disc_gets_there, in_reach
+from mbf_costmap_nav.planning.passage import too_narrow
+from mbf_costmap_nav.planning.widest_disc import in_reach
 
 EIGHT_NEIGHBOURS = np.ones((3, 3), dtype=bool)
 
@@ -63,7 +64,7 @@ def is_permanently_too_narrow(costmap: LayeredCostmap, start: Pose, goal: Pose, 
     walls = costmap.permanent_costmap()
     if walls is None or not (walls.contains(start.x, start.y) and walls.contains(goal.x, goal.y)):
         return False
-    return not disc_gets_there(walls, costmap.footprint, start, goal, tolerance)
+    return too_narrow(walls, costmap.footprint, start, goal, tolerance) is not None
 
 
 def never_fits(costmap: LayeredCostmap, goal: Pose, tolerance: float, angle_tolerance: float) -> bool:

@@ -23,7 +23,16 @@ from numpy.typing import NDArray
 from mbf_abstract.compiling.decorators import Count, inner_kernel, kernel
 from mbf_costmap_nav.kernels.car.curves import sample_word
 from mbf_costmap_nav.kernels.car.ground import Ground, driven_cost
-from mbf_costmap_nav.kernels.car.joints import HEADINGS, FloatArray, Joint, Target, heuristic, new_target, try_joints
+from mbf_costmap_nav.kernels.car.joints import (
+    HEADINGS,
+    FloatArray,
+    Joint,
+    Target,
+    cost_to_go,
+    heuristic,
+    new_target,
+    try_joints,
+)
 from mbf_costmap_nav.kernels.car.motion_primitives import (
     BACKWARD_SIDE,
     FORWARD_MOTIONS,
@@ -107,6 +116,17 @@ def _nearest_state(tree: StateTree, goal: FloatArray, tolerance: float) -> int:
 
 
 @kernel
+def _nearest_to_target(ground: Ground, tree: StateTree, target: Target) -> FloatArray:
+    """Place (2,) [m] of the state of a tree from which the centre alone has least left to drive."""
+    best, least = 0, np.inf
+    for i in range(tree.made[0]):
+        left = cost_to_go(ground, tree.poses[i], target)
+        if left < least:
+            best, least = i, left
+    return tree.poses[best, :2].copy()
+
+
+@kernel
 def hybrid_search(
     ground: Ground,
     car: Car,
@@ -117,7 +137,7 @@ def hybrid_search(
     tolerance: float,
     max_states: int,
     cancel_flag: NDArray[np.uint8],
-) -> tuple[int, FloatArray, float, int]:
+) -> tuple[int, FloatArray, float, int, FloatArray]:
     """Search a path from the start to the goal.
 
     Parameters
@@ -145,6 +165,8 @@ def hybrid_search(
         Of the path [m], weighted.
     states : int
         How many were made.
+    stuck : (2,) float64
+        Without a path, where [m] the smaller of both trees came nearest to the other root, as the centre would drive.
     """
     (start, goal), (first, last_cell) = ends, cells
     from_goal = new_target(start, new_field(memory[0], first, last_cell, cancel_flag))
@@ -159,7 +181,7 @@ def hybrid_search(
     while len(heap) > 0 and (len(other_heap) > 0 or tolerance > 0.0):
         count = tree.made[0] + other.made[0]
         if cancel_flag[0] != 0:
-            return CANCELED, nothing, 0.0, count
+            return CANCELED, nothing, 0.0, count, start[:2].copy()
         # 1. With a path at hand, stop when none of the open states promises a better one, or it took long enough.
         if joint.cost[0] < np.inf:
             last_count = min(last_count, count + count // 2 + SPARE_STATES)
@@ -189,8 +211,12 @@ def hybrid_search(
         curve = sample_word(pose[0], pose[1], pose[2], joint.word, car.radius, ground.geometry[0])
         behind = path_from_root(other, b, BACKWARD_SIDE, car)[::-1]
         path = np.concatenate((path_from_root(tree, a, FORWARD_SIDE, car), curve, behind[1:]))
-        return FOUND, path, joint.cost[0], count
+        return FOUND, path, joint.cost[0], count, goal[:2].copy()
     last = _nearest_state(tree, wanted, tolerance) if tolerance > 0.0 else -1
+    if tree.made[0] <= other.made[0]:
+        stuck = _nearest_to_target(ground, tree, from_start)
+    else:
+        stuck = _nearest_to_target(ground, other, from_goal)
     if last < 0:
-        return status, nothing, 0.0, count
-    return NEARBY, path_from_root(tree, last, FORWARD_SIDE, car), tree.g[last], count
+        return status, nothing, 0.0, count, stuck
+    return NEARBY, path_from_root(tree, last, FORWARD_SIDE, car), tree.g[last], count, stuck

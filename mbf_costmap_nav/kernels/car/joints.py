@@ -75,8 +75,8 @@ class Joint(NamedTuple):
 
 
 @kernel
-def heuristic(ground: Ground, car: Car, side: float, pose: FloatArray, target: Target) -> float:
-    """Larger of the field [m] at the pose's cell and the length of the free curve."""
+def cost_to_go(ground: Ground, pose: FloatArray, target: Target) -> float:
+    """The field [m] at the pose's cell."""
     geometry = ground.geometry
     ix, iy = int((pose[0] - geometry[1]) / geometry[0]), int((pose[1] - geometry[2]) / geometry[0])
     x, y = ix + 1, iy + 1
@@ -85,7 +85,13 @@ def heuristic(ground: Ground, car: Car, side: float, pose: FloatArray, target: T
     rest = octile_distance(abs(x - target.toward[0]), abs(y - target.toward[1]))
     if target.progress[WAITING] > 0 and np.float32(lower) < cost + rest:
         cost = field_cost(target.fields[0], cell)
-    around = float(cost * geometry[0])
+    return float(cost * geometry[0])
+
+
+@kernel
+def heuristic(ground: Ground, car: Car, side: float, pose: FloatArray, target: Target) -> float:
+    """Larger of the field [m] at the pose's cell and the length of the free curve."""
+    around = cost_to_go(ground, pose, target)
     if around > CURVE_RANGE * car.radius:
         return around
     ends = (pose, target.pose) if side == FORWARD_SIDE else (target.pose, pose)

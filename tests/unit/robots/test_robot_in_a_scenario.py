@@ -47,6 +47,12 @@ global_costmap: &map
   slopes: {map_file: $WORLD_MAP}
 local_costmap: *map
 """
+ON_A_MESH = """
+backend: mesh
+planners: [{name: dijkstra, type: mesh.dijkstra}]
+controllers: [{name: follow, type: mesh.path_follower}]
+mesh_map: {mesh_file: $WORLD_MESH}
+"""
 
 
 @pytest.fixture
@@ -283,6 +289,17 @@ def test_mbf_check_names_controllers_that_a_car_cannot_do(scenario, tmp_path):
     assert checked.exit_code == 0, checked.output
     told = " ".join(checked.output.split())
     assert "controller 'pursuit' turns on the spot, which the robot cannot: its tightest curve is" in told
+    assert "m; costmap.regulated_pure_pursuit or costmap.mppi with motion_model: ackermann suits it" in told
+
+
+def test_mbf_check_names_controllers_of_a_mesh_that_a_car_cannot_do(scenario, tmp_path):
+    file = scenario(
+        "{urdf: 'package://pybullet_data/racecar/racecar.urdf'}", backend="mesh", navigation={"mesh": "nav.yaml"}
+    )
+    (tmp_path / "nav.yaml").write_text(ON_A_MESH)
+    told = " ".join(checked(file).output.split())
+    assert "controller 'follow' turns on the spot, which the robot cannot: its tightest curve is" in told
+    assert "m; mesh.mppi with motion_model: ackermann suits it" in told
 
 
 def test_mbf_check_lists_mistakes_of_the_urdf_and_of_the_scenario_together(scenario):
