@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.drive.robot import Odometry
-from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Quaternion, Twist, Vector3
+from mbf_abstract.geometry import Path, Pose, Quaternion, Twist, Vector3
 from mbf_abstract.geometry.transform import Transform, TransformError
 from mbf_ros.messages.interfaces import Message, MessageError
 
@@ -182,21 +182,6 @@ def twist_of(message: Mapping[str, Any]) -> Twist:
         return Twist(vector_of(message["linear"]), vector_of(message["angular"]))
     except ValueError as error:
         raise InvalidValueError(f"twist: {error}") from error
-
-
-def command_twist(command: Command | None) -> Twist:
-    """Return a command as a Twist; the steering angle of a car is its ``angular.z``, as the `teb_local_planner` has it.
-
-    A Twist has no field for a steering angle; a driver of a car has to know that it is one.
-    """
-    if isinstance(command, AckermannCommand):
-        return Twist((command.speed, 0.0, 0.0), (0.0, 0.0, command.steering_angle))
-    return command or Twist()
-
-
-def twist_stamped(value: Twist, frame_id: str, stamp: float, context: MessageContext) -> Message:
-    """Return a geometry_msgs/TwistStamped."""
-    return {"header": context.header(frame_id, stamp), "twist": twist(value)}
 
 
 def odometry_message(value: Odometry, T_odom_base: Transform, context: MessageContext) -> Message:

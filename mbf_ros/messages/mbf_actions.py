@@ -10,7 +10,8 @@ from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
 from mbf_abstract.goals.result_types import ExePathResult, GetPathResult, MoveBaseResult, RecoveryResultMessage
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_ros.messages.action_mapping import ActionMapping, path_or_refuse, pose_or_refuse
-from mbf_ros.messages.geometry import MessageContext, command_twist, path_message, pose_stamped, twist_stamped
+from mbf_ros.messages.commands import command_message
+from mbf_ros.messages.geometry import MessageContext, path_message, pose_stamped
 from mbf_ros.messages.interfaces import Message
 
 
@@ -59,14 +60,14 @@ def driving_result(result: ExePathResult | MoveBaseResult, context: MessageConte
 
 def driving_feedback(feedback: ExePathFeedback, context: MessageContext) -> Message:
     """Return an ExePath_Feedback or a MoveBase_Feedback; a command of a car as in ``command_twist``."""
-    command, pose = command_twist(feedback.last_command), feedback.current_pose
+    command, pose = feedback.last_command, feedback.current_pose
     return {
         "outcome": feedback.outcome,
         "message": feedback.message,
         "dist_to_goal": feedback.dist_to_goal,
         "angle_to_goal": feedback.angle_to_goal,
         "current_pose": pose_stamped(pose, context),
-        "last_cmd_vel": twist_stamped(command, "base_link", pose.stamp, context),
+        "last_cmd_vel": command_message(command, True, "base_link", pose.stamp, context),
     }
 
 

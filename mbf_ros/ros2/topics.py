@@ -12,7 +12,8 @@ from mbf_abstract.time.clock import Clock, WallClock
 from mbf_abstract.time.ticker import Ticker
 from mbf_ros.map_messages import Audience, Output
 from mbf_ros.messages.cdr import serialized
-from mbf_ros.messages.geometry import MessageContext, command_twist, twist, twist_stamped
+from mbf_ros.messages.commands import STAMPED, command_message, command_type
+from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import MessageError
 from mbf_ros.navigator_messages import NavigatorMessages
 from mbf_ros.robot_inputs import Input, Quality
@@ -32,20 +33,18 @@ class CommandTopic:
     def __init__(
         self, node: Any, stamped: bool, robot_frame: str, clock: Clock, context: Callable[[], MessageContext]
     ) -> None:
-        stamped_class = interface_class("geometry_msgs/TwistStamped")
-        self._class = stamped_class if stamped else interface_class("geometry_msgs/Twist")
-        self._stamped_class, self._stamped = stamped_class, stamped
+        self._class, self._stamped_class = interface_class(command_type(stamped)), interface_class(STAMPED)
+        self._stamped = stamped
         self._frame, self._clock, self._context = robot_frame, clock, context
         self._publisher = node.create_publisher(self._class, CMD_VEL, 10)
-        self._own = node.create_publisher(stamped_class, OWN_CMD_VEL, 10)
+        self._own = node.create_publisher(self._stamped_class, OWN_CMD_VEL, 10)
 
     def publish(self, command: Command) -> None:
         """Publish a command; does not wait."""
-        value = command_twist(command)
-        with_stamp = twist_stamped(value, self._frame, self._clock.now(), self._context())
-        self._publisher.publish(fill(self._class(), with_stamp if self._stamped else twist(value)))
+        now, context = self._clock.now(), self._context()
+        self._publisher.publish(fill(self._class(), command_message(command, self._stamped, self._frame, now, context)))
         if self._own.get_subscription_count():
-            self._own.publish(fill(self._stamped_class(), with_stamp))
+            self._own.publish(fill(self._stamped_class(), command_message(command, True, self._frame, now, context)))
 
     def wait_until_sent(self, seconds: float) -> None:
         """Wait until all who listen have the last command, for at most ``seconds``."""

@@ -12,7 +12,8 @@ from mbf_abstract.geometry import Command
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.ticker import Ticker
 from mbf_ros.map_messages import Audience
-from mbf_ros.messages.geometry import MessageContext, command_twist, twist, twist_stamped
+from mbf_ros.messages.commands import command_message, command_type
+from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.navigator_messages import NavigatorMessages
 from mbf_ros.rosbridge.actionlib import ActionlibServer
@@ -79,15 +80,13 @@ class Publisher:
 
     def send_command(self, command: Command) -> None:
         """Publish a command at once, for a robot that listens to ``/cmd_vel``; never waits."""
-        value, now = command_twist(command), self._session.clock.now()
-        frame_id = self._server.runtime.robot.robot_frame
-        message = twist_stamped(value, frame_id, now, self._context) if self._stamped_commands else twist(value)
-        self._send("/cmd_vel", message)
+        frame_id, now = self._server.runtime.robot.robot_frame, self._session.clock.now()
+        self._send("/cmd_vel", command_message(command, self._stamped_commands, frame_id, now, self._context))
 
     # -------------------------------------------------------------------------------------------------------
     def _add_topics(self) -> None:
         add = self._topics.add_output
-        add("/cmd_vel", "geometry_msgs/TwistStamped" if self._stamped_commands else "geometry_msgs/Twist")
+        add("/cmd_vel", command_type(self._stamped_commands))
         for one in self._messages.outputs:
             outdates = self._outputs.get(one.outdates, "")
             add(node_topic(one), one.type, one.always, one.depth, one.shared, outdates)

@@ -13,7 +13,8 @@ from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import Clock
 from mbf_abstract.time.ticker import Ticker
 from mbf_ros.map_messages import Audience
-from mbf_ros.messages.geometry import MessageContext, command_twist, twist, twist_stamped
+from mbf_ros.messages.commands import command_message, command_type
+from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.navigator_messages import DIAGNOSTICS, FOOTPRINT, GOAL, LOCAL_PLAN, LOCALIZATION, PLAN, NavigatorMessages
 from mbf_ros.rosbridge.navigation import node_topic
 from mbf_ros.rosbridge.protocol import frame
@@ -69,17 +70,15 @@ class CommandTopic:
 
     def greeting(self) -> list[str]:
         """Return the frames with which each connection begins."""
-        kind = "geometry_msgs/TwistStamped" if self._stamped else "geometry_msgs/Twist"
-        frames = [frame("advertise", topic=CMD_VEL, type=kind)]
+        frames = [frame("advertise", topic=CMD_VEL, type=command_type(self._stamped))]
         if self._was_connected:
             frames.append(self._publication(Twist()))
         self._was_connected = True
         return frames
 
     def _publication(self, command: Command) -> str:
-        value, now = command_twist(command), self._clock.now()
-        message = twist_stamped(value, self._frame, now, self._context()) if self._stamped else twist(value)
-        return frame("publish", topic=CMD_VEL, msg=message)
+        now, context = self._clock.now(), self._context()
+        return frame("publish", topic=CMD_VEL, msg=command_message(command, self._stamped, self._frame, now, context))
 
 
 class Settling:

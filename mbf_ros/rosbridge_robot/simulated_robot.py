@@ -12,7 +12,8 @@ from contextlib import ExitStack, contextmanager
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import unix_seconds
 from mbf_abstract.time.ticker import Ticker
-from mbf_ros.messages.geometry import MessageContext, twist_of
+from mbf_ros.messages.commands import command_of, command_type
+from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.rosbridge.authentication import Authentication
 from mbf_ros.rosbridge.bridge import Bridge
@@ -48,14 +49,13 @@ def serve_robot(session: NavigationSession, options: BridgeOptions | None = None
     served = rosbridge_server(bridge, events, options.server)
 
     def drive(message: Message) -> None:
-        lease.send(twist_of(message["twist"] if options.stamped_commands else message))
+        lease.send(command_of(message, options.stamped_commands))
 
     def send(topic: str, message: Message) -> None:
         if bridge.topics.is_wanted(topic):
             served.post(bridge.topics.send, topic, frame("publish", topic=topic, msg=message))
 
-    kind = "geometry_msgs/TwistStamped" if options.stamped_commands else "geometry_msgs/Twist"
-    bridge.topics.add_input("/cmd_vel", kind, drive)
+    bridge.topics.add_input("/cmd_vel", command_type(options.stamped_commands), drive)
     take_initial_poses(bridge, session, context)
     with ExitStack() as closing:
         closing.callback(lease.release)

@@ -18,7 +18,8 @@ from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
 from mbf_abstract.goals.result_types import ActionResult, ExePathResult, GetPathResult, MoveBaseResult, RefinePathResult
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RefinePathOutcome
 from mbf_ros.messages.action_mapping import ActionMapping, G, R, RefusedGoal, path_or_refuse, pose_or_refuse
-from mbf_ros.messages.geometry import MessageContext, command_twist, duration, path_message, pose_stamped
+from mbf_ros.messages.commands import command_twist
+from mbf_ros.messages.geometry import MessageContext, duration, path_message, pose_stamped
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.messages.nav2 import codes
 

@@ -17,7 +17,8 @@ from mbf_abstract.event_values import error_text
 from mbf_abstract.geometry import Command, Pose
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import Clock, WallClock
-from mbf_ros.messages.geometry import InvalidValueError, MessageContext, pose_stamped, twist_of
+from mbf_ros.messages.commands import command_of, command_type
+from mbf_ros.messages.geometry import InvalidValueError, MessageContext, pose_stamped
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.robot_inputs import INITIAL_POSE_TYPE, RobotInputs
 from mbf_ros.robot_messages import SENSOR_TOPICS, STATE_TOPICS, TF, TF_STATIC, RobotMessages, state_topics
@@ -117,7 +118,7 @@ class SimulatedRobot:
             topic: self._node.create_publisher(kind, _name(topic), qualities.get(topic, usual))
             for topic, kind in self._classes.items()
         }
-        command = interface_class("geometry_msgs/TwistStamped" if stamped_commands else "geometry_msgs/Twist")
+        command = interface_class(command_type(stamped_commands))
         self._node.create_subscription(command, CMD_VEL, self._taking(stamped_commands), usual)
         inputs = RobotInputs(self._session.clock.now, lambda: self._context)
         Inputs(self._node).listen(inputs.of_localization(self._session.set_initial_pose))
@@ -137,7 +138,7 @@ class SimulatedRobot:
         def take(message: Any) -> None:
             values = to_dict(message)
             try:
-                command = twist_of(values["twist"] if stamped else values)
+                command = command_of(values, stamped)
             except InvalidValueError as error:
                 self._node.get_logger().warning(f"{CMD_VEL}: {error}", throttle_duration_sec=WARN_PERIOD)
                 return
