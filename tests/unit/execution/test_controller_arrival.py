@@ -294,3 +294,13 @@ def test_a_loop_ends_with_one_event_that_counts_its_cycles(make_session):
     assert (reported.source, reported.data["failed"]) == ("controller", 2)
     assert reported.data["cycles"] == len(session.controller.requests)
     assert reported.data["began"] < reported.time
+
+
+@pytest.mark.parametrize(
+    ("radius", "off", "tolerance"),
+    [(2.0, 0.0, 0.5), (0.2, 0.0, 0.18), (0.6, 0.2, 0.36), (0.2, 0.3, 0.5)],
+    ids=["a wide area", "a narrow one", "beside its middle", "outside"],
+)
+def test_a_controller_may_stop_short_of_an_end_inside_an_area_by_what_keeps_the_robot_inside(radius, off, tolerance):
+    end, area = Pose.planar(3.0, 0.0), DiscArea(Pose.planar(3.0 + off, 0.0), radius)
+    assert ArrivalCheck(end, 0.5, 0.1, area=area).dist_tolerance == pytest.approx(tolerance)
