@@ -102,7 +102,9 @@ class InflationLayer(MeshLayer):
         """Repair the distances around the vertices that became sources or ceased to be, and the costs."""
         source, source_cost = self.inputs[0], np.float32(self.parameters.source_cost)
         flipped = update_sources(source.lethal, source.costs, source_cost, changed, self._lethal, self._is_source)
-        return union_of([np.sort(self._repair(changed, self._costs)), flipped])
+        repaired = self._repair(changed, self._costs)
+        repaired.sort()
+        return union_of([repaired, flipped])
 
     def _drop_all(self) -> None:
         count = self.topology.vertex_count

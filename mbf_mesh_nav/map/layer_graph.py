@@ -12,7 +12,6 @@ are not up to date.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -54,13 +53,13 @@ class LayerGraph(LayerStack[MeshLayer]):
             Whatever a layer raises; see the module's text.
         """
         changed = dict(self._owed)
-        for name, layer in self.items():
+        for name, layer in self._layers.items():
             from_inputs = union_of([changed[read.name] for read in layer.inputs if read.name in changed])
             try:
-                with self.computing(layer):
-                    followed, by_event = self._follow(layer, from_inputs), _vertices(layer, event(layer))
-                    own = union_of([changed.get(name, NOTHING_CHANGED), followed, by_event])
-            except BaseException:  # also a sys.exit()
+                followed, by_event = self._follow(layer, from_inputs), _vertices(layer, event(layer))
+                own = union_of([changed.get(name, NOTHING_CHANGED), followed, by_event])
+            except BaseException as error:  # also a sys.exit()
+                self.note(layer, error)
                 self._interrupted.add(name)
                 self._owed = changed
                 raise
@@ -109,7 +108,7 @@ class LayerGraph(LayerStack[MeshLayer]):
             raise
 
 
-def _vertices(layer: MeshLayer, changed: Any) -> IntArray:
+def _vertices(layer: MeshLayer, changed: object) -> IntArray:
     """The vertices that a layer says it has changed, ascending without repetitions.
 
     Raises
@@ -117,11 +116,13 @@ def _vertices(layer: MeshLayer, changed: Any) -> IntArray:
     TypeError, IndexError
         It returned something else, or vertices that the mesh does not have.
     """
+    if changed is NOTHING_CHANGED:
+        return NOTHING_CHANGED
     vertices, count = np.asarray(changed), layer.topology.vertex_count
     if vertices.ndim != 1 or (len(vertices) and vertices.dtype.kind not in "iu"):
         got = f"{type(changed).__name__} of shape {vertices.shape}, type {vertices.dtype}"
         raise TypeError(f"a layer returns the vertices (k,) int that have changed, got {got}")
-    if (vertices[1:] <= vertices[:-1]).any():
+    if np.count_nonzero(vertices[1:] > vertices[:-1]) < len(vertices) - 1:
         vertices = np.unique(vertices)
     if len(vertices) and not (vertices[0] >= 0 and vertices[-1] < count):
         raise IndexError(

@@ -10,7 +10,6 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,39 +75,45 @@ class MeshSnapshot:
         return np.where(lethal | np.isposinf(costs), LETHAL_RANK, by_cost).astype(np.float32)
 
 
-class _Loan:
-    """Lives as long as anything refers to a view of the arrays of one snapshot."""
-
-
 class _Lent:
-    """An array as a snapshot shows it; numpy keeps this object, and so the loan, alive for every view made of it."""
+    """Memory as one snapshot shows it; numpy keeps this object alive for every view that is made of it."""
 
-    def __init__(self, array: NDArray[Any], loan: _Loan) -> None:
-        self.__array_interface__ = array.__array_interface__
-        self._owner, self._loan = array, loan
+    def __init__(self, memory: NDArray[np.uint8]) -> None:
+        self.__array_interface__ = memory.__array_interface__
+        self._owner = memory
 
 
 class _Arrays:
-    """Arrays that are shown by one snapshot after the other."""
+    """Arrays that are shown by one snapshot after the other, in one piece of memory, which is lent as a whole."""
 
-    def __init__(self, costs: CostArray, lethal: LethalArray, edge_weights: CostArray) -> None:
-        self.arrays = costs, lethal, edge_weights
-        self._loan: Callable[[], _Loan | None] = lambda: None
+    def __init__(self, memory: NDArray[np.uint8], vertex_count: int) -> None:
+        self._memory, self._vertex_count = memory, vertex_count
+        self.arrays = self._parts(memory)
+        self._lent: Callable[[], _Lent | None] = lambda: None
+
+    @classmethod
+    def of(cls, costs: CostArray, lethal: LethalArray, edge_weights: CostArray) -> _Arrays:
+        """Copies of costs (V,), lethal flags (V,) and weights of edges (2E,)."""
+        parts = costs, edge_weights, lethal
+        return cls(np.concatenate([part.view(np.uint8) for part in parts]), len(costs))
 
     def copy(self) -> _Arrays:
-        costs, lethal, edge_weights = self.arrays
-        return _Arrays(costs.copy(), lethal.copy(), edge_weights.copy())
+        return _Arrays(self._memory.copy(), self._vertex_count)
 
     def is_held(self) -> bool:
         """Whether anything still refers to the last snapshot of these arrays, or any part of it."""
-        return self._loan() is not None
+        return self._lent() is not None
 
     def show(self, version: int, edge_cost_factor: float) -> MeshSnapshot:
         """Make the snapshot of what the arrays are now."""
-        loan = _Loan()
-        self._loan = weakref.ref(loan)
-        costs, lethal, weights = (np.asarray(_Lent(part, loan)) for part in self.arrays)
-        return MeshSnapshot(version, costs, lethal, weights, edge_cost_factor)
+        lent = _Lent(self._memory)
+        self._lent = weakref.ref(lent)
+        return MeshSnapshot(version, *self._parts(np.asarray(lent)), edge_cost_factor)
+
+    def _parts(self, memory: NDArray[np.uint8]) -> tuple[CostArray, LethalArray, CostArray]:
+        numbers = memory[: -self._vertex_count].view(np.float32)  # first, where they are aligned
+        flags = memory[-self._vertex_count :].view(np.bool_)
+        return numbers[: self._vertex_count], flags, numbers[self._vertex_count :]
 
 
 class SnapshotSeries:
@@ -128,7 +133,7 @@ class SnapshotSeries:
         """Make a snapshot that has nothing to do with the one before; costs (V,), lethal (V,), see ``MeshSnapshot``."""
         self._edge_cost_factor = edge_cost_factor
         weights = np.zeros(len(self._topology.neighbours), np.float32)
-        self._current, self._spare = _Arrays(costs.copy(), lethal.copy(), weights), None
+        self._current, self._spare = _Arrays.of(costs, lethal, weights), None
         self._changes.clear()
         return self._published(costs, lethal, np.arange(len(costs), dtype=np.int32))
 

@@ -68,8 +68,12 @@ class LayerStack(Mapping[str, Layer_co], Generic[Layer_co]):
         try:
             yield
         except BaseException as error:
-            self.problem = f"layer {layer.name!r} raised {type(error).__name__}: {error_text(error)}"
+            self.note(layer, error)
             raise
+
+    def note(self, layer: MapLayer, error: BaseException) -> None:
+        """Keep as ``problem`` what a layer raised."""
+        self.problem = f"layer {layer.name!r} raised {type(error).__name__}: {error_text(error)}"
 
     def stale_reason(self, now: float) -> str:
         """Which layer raised, or why the first stale layer is so at ``now`` [s]; empty if all are fresh."""
