@@ -171,6 +171,17 @@ def test_a_cancel_through_an_old_handle_does_not_touch_the_new_goal(make_session
     assert second.wait().success
 
 
+def test_a_goal_that_takes_over_from_a_canceled_one_has_its_own_time(make_session):
+    session = make_session(cancel_grace=0.2, controller_patience=5.0)
+    first = send(session, 5.0)
+    session.clock.sleep(1.0)
+    session.controller.play(slow(session.clock, 1.0, session.controller.follow), session.controller.follow)
+    second = send(session, 3.0)
+    first.cancel()  # the newer goal is on offer already
+    assert second.wait().success
+    assert first.status is GoalStatus.CANCELED
+
+
 def test_a_goal_canceled_while_it_waits_for_its_slot_never_runs(make_session):
     session = make_session(TWO, cancel_grace=5.0)
     first = send(session, 5.0, controller="controller")

@@ -66,6 +66,28 @@ def test_a_canceled_behaviour_ends_canceled(make_session):
     assert session.clock.now() == pytest.approx(1.0)
 
 
+def test_after_a_cancel_the_driver_has_a_grace_of_its_own(make_session):
+    session = make_session(cancel_grace=1.0, command_timeout=5.0)
+    send, clock = session.robot.send_command, session.clock
+
+    def send_slowly(command):
+        clock.sleep(0.5 if command.is_stopped() else 0.0)
+        send(command)
+
+    def ends_late(request):
+        request.motion.send(Twist.planar(0.3))
+        clock.sleep(0.8)  # without a look at its token
+        return DONE
+
+    session.robot.send_command = send_slowly
+    session.recovery.play(ends_late)
+    handle = session.navigator.send(RecoveryGoal())
+    clock.sleep(0.0)
+    handle.cancel()
+    assert handle.wait().message == "recovery 'recovery' canceled"
+    assert clock.now() == pytest.approx(1.3)
+
+
 def test_a_behaviour_that_outlasts_its_patience_ends_with_pat_exceeded(make_session):
     session = make_session(recovery_patience=2.0)
     session.recovery.play(wait_for(10.0))
