@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_abstract.execution.path_tracker import CUSP_REACHED, PathTracker
+from mbf_abstract.execution.path_tracker import CUSP_REACHED, SEARCH_WINDOW, PathTracker
 from mbf_abstract.geometry import Path, Pose
 
 
@@ -104,6 +104,21 @@ def test_the_progress_waits_at_a_cusp_until_the_robot_has_come_to_it():
     assert walk(tracker, (0, 0), (1.8, 0))[-1] == pytest.approx(1.8)
     assert walk(tracker, (1.8, 0), (1.92, 0))[-1] == pytest.approx(2.0)
     assert tracker.driving_backward and tracker.to_cusp == pytest.approx(2.0)
+
+
+def test_a_robot_beside_a_cusp_is_not_taken_for_one_that_comes_back_from_it():
+    tracker = PathTracker(path_through((0, 0), (1, 0), (0, 0.3)))
+    walk(tracker, (0, 0), (0.5, 0))
+    tracker.update((0.85, 0.1, 0.0))  # nearer to the path behind the cusp
+    assert tracker.progress == pytest.approx(0.85)
+
+
+def test_one_look_goes_on_by_no_more_than_the_window():
+    angles = np.linspace(0.0, 2.0 * math.pi, 200)
+    tracker = PathTracker(path_through(*zip(np.cos(angles), np.sin(angles), strict=True)))
+    tracker.update((1.0, 0.0, 0.0))
+    tracker.update((-0.05, 0.0, 0.0))  # across the circle is 3.1 m along it
+    assert 0.0 < tracker.progress <= SEARCH_WINDOW
 
 
 @pytest.mark.parametrize("spacing", SPACINGS)

@@ -390,3 +390,15 @@ def test_turning_far_enough_is_progress(make_session):
     assert not handle.done
     handle.cancel()
     handle.wait()
+
+
+@pytest.mark.parametrize(("end_heading", "ends"), [(3.0, False), (0.0, True)])
+def test_at_the_end_of_its_path_only_a_turn_to_the_goals_heading_is_progress(make_session, end_heading, ends):
+    session = make_session(progress_timeout=3.0, dist_tolerance=0.1, angle_tolerance=0.05)
+    session.controller.play(drive(0.0, 0.2))
+    goal = Pose.planar(0.2, 0.0, end_heading)
+    handle = session.navigator.send(ExePathGoal(Path.from_poses([Pose.planar(0.0, 0.0), goal])))
+    session.clock.sleep(10.0)
+    assert handle.done is ends
+    handle.cancel()
+    assert handle.wait().outcome == (Outcome.OSCILLATION if ends else Outcome.CANCELED)
