@@ -22,6 +22,8 @@ class PursuitSteering(RegulatedFollower):
     """Steering to a carrot on the path."""
 
     _at_goal = False
+    _fastest = math.inf
+    """Speed [m/s] that leaves room to brake before a tight place."""
 
     def _backward(self, cycle: ControlCycle) -> bool:
         return self.parameters.allow_reversing and cycle.tracker.driving_backward
@@ -33,12 +35,6 @@ class PursuitSteering(RegulatedFollower):
 
     def _turn(self, cycle: ControlCycle, angle: float) -> Twist:
         return Twist.planar(wz=self.rotation_speed(angle, cycle.request.velocity.wz))
-
-    def _slowed(self, motion: Twist, velocity: Twist) -> Twist:
-        """The same arc as slowly as the robot can drive it by now."""
-        change = self.parameters.acc_lim_x * self.parameters.control_period
-        speed = min(max(motion.vx, velocity.vx - change), velocity.vx + change)
-        return Twist.planar(speed, wz=motion.wz / motion.vx * speed)
 
     def _carrot(self, cycle: ControlCycle) -> tuple[float, float]:
         """Look-ahead point in the base frame; past a cusp it lies straight on."""
@@ -72,7 +68,7 @@ class PursuitSteering(RegulatedFollower):
         """Command along an arc."""
         p, velocity = self.parameters, cycle.request.velocity
         cost = cycle.costmap.cost_at(cycle.request.pose.x, cycle.request.pose.y) or FREE
-        regulated = min(self.regulated_speed(curvature, cost, cycle.tracker.to_cusp), cycle.speed_limit)
+        regulated = min(self.regulated_speed(curvature, cost, cycle.tracker.to_cusp), cycle.speed_limit, self._fastest)
         wanted = -regulated if backward else regulated
         change = p.acc_lim_x * p.control_period
         speed = min(max(wanted, velocity.vx - change), velocity.vx + change)

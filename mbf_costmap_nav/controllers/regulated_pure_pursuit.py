@@ -11,9 +11,10 @@ Formula: pure pursuit (Coulter 1992), curvature = 2 y / L^2; the speeds are thos
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from mbf_abstract.execution.path_tracker import CUSP_REACHED
-from mbf_abstract.geometry import Path, Twist
+from mbf_abstract.geometry import FloatArray, Path, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.continued_path import carried_over
 from mbf_abstract.maps.controllers.end_of_path import at_exact_end, swept_poses, turn_left
@@ -31,20 +32,28 @@ from mbf_abstract.maps.controllers.room_to_turn import (
     poses_ahead,
     wider_curves,
 )
-from mbf_abstract.maps.controllers.tight_places import AT_ONCE, CLOSE_FROM, CLOSELY, TightPlaces
+from mbf_abstract.maps.controllers.tight_places import (
+    AT_ONCE,
+    CLOSE_FROM,
+    CLOSELY,
+    KEPT,
+    REACH,
+    SPACING,
+    TightPlaces,
+    speed_before,
+)
 from mbf_abstract.maps.controllers.way_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_costmap_nav.control.close_steering import steer_closely
 from mbf_costmap_nav.control.path_handling import ControlCycle
-from mbf_costmap_nav.control.pursuit_steering import PursuitSteering
+from mbf_costmap_nav.control.rolling import RollingPursuit, sweep_step
 
 LEADS_OUT = 0.3  # m; so far a robot that touches something looks whether the motion leads out
-SWEEP_STEP = 0.1  # cells; from pose to pose of a turn at the goal, which must look the same from every heading in it
 SLOWEST = 0.01  # m/s; slower commands are looked ahead for as long as this one, to bound the work
 
 
-class RegulatedPurePursuitController(LeavesContacts, PursuitSteering):
+class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
     """Carrot follower with regulated speed."""
 
     leaves_contacts = True
@@ -74,6 +83,8 @@ class RegulatedPurePursuitController(LeavesContacts, PursuitSteering):
         is_blocked = result.outcome == ExePathOutcome.BLOCKED_PATH
         if is_blocked and self.tracker and self._tight_places.begin_next_stroke(self.tracker):
             return self.compute_velocity_commands(request)
+        if isinstance(command := result.command, Twist) and command.vx != 0.0 and self._rolls(cycle, command):
+            return replace(result, command=self._slowed(command, request.velocity))
         return result
 
     def _way_out(self, cycle: ControlCycle) -> Twist | None:
@@ -110,15 +121,22 @@ class RegulatedPurePursuitController(LeavesContacts, PursuitSteering):
         def fits(x: float, y: float, yaw: float) -> bool:
             return not cycle.footprint.collides(cycle.costmap, x, y, yaw)
 
-        if self._tight_places.distance(cycle.tracker, self.parameters.allow_reversing, fits) > CLOSE_FROM:
+        rolls_on, p = self._rolls_on(cycle), self.parameters
+        reach = max(REACH, CLOSE_FROM + rolls_on + KEPT + 2.0 * SPACING)
+        to_tight = self._tight_places.distance(cycle.tracker, p.allow_reversing, fits, reach)
+        self._fastest = speed_before(to_tight, p.acc_lim_x)
+        if to_tight > CLOSE_FROM:
             return []
-        motions = closely_along_path(cycle.tracker, cycle.request.pose, backward)
+        motions = closely_along_path(cycle.tracker, cycle.request.pose, backward, rolls_on)
         close = [no_tighter(motion, self.turning_radius) for motion in motions]
         if close:
             self.tracker.cusp_reached = CLOSELY
         elif self.rotates and self._tight_places.is_close(cycle.tracker):
-            return [self._turn(cycle, angle_to_path(cycle.tracker, cycle.request.pose, backward))]
-        return [self._slowed(motion, cycle.request.velocity) for motion in close]
+            turn = self._turn(cycle, angle_to_path(cycle.tracker, cycle.request.pose, backward))
+            return [Twist() if self._rolls(cycle, turn) else turn]
+        return [
+            motion if self._rolls(cycle, motion) else self._slowed(motion, cycle.request.velocity) for motion in close
+        ]
 
     def _steered(self, cycle: ControlCycle, backward: bool, *, is_tight: bool) -> Twist | None:
         """The arc by which a car keeps best to its path, creeping in a tight place; None far from the path."""
@@ -144,11 +162,13 @@ class RegulatedPurePursuitController(LeavesContacts, PursuitSteering):
         ahead = poses_ahead(cycle.tracker, self.look_ahead_distance(self.full_speed), backward)
         if cycle.first_collision(ahead) >= 0:
             return []
-        close = along_path(cycle.tracker, pose, backward)
+        close = along_path(cycle.tracker, pose, backward, rolls_on=self._rolls_on(cycle))
         motions = [motion for motion in close if abs(motion.wz) * self.turning_radius <= abs(motion.vx)]
         if not self.rotates:
             return motions
         error = angle_to_path(cycle.tracker, pose, backward)
+        if self._rolls(cycle, Twist()):
+            return [*motions, Twist()] if self._can_turn_where_it_stops(cycle, backward) else motions
         return [*motions, self._turn(cycle, error)] if abs(error) > SMALL_TURN else motions
 
     # ----------------------------------------------------------------------------------------------- collisions
@@ -173,7 +193,8 @@ class RegulatedPurePursuitController(LeavesContacts, PursuitSteering):
         """Where a command leads into an obstacle in the check time, not beyond the next cusp; empty if free."""
         if command is self._known_free:
             return ""
-        if command.vx == 0.0 and self.costmap.unpadded_footprint.is_circle:
+        rolls = self._rolls(cycle, command)
+        if command.vx == 0.0 and not rolls and self.costmap.unpadded_footprint.is_circle:
             return ""  # whatever the polygon does that stands for it
         if self._at_goal and command.vx == 0.0:
             return self._blocked_at_goal(cycle, command)
@@ -183,21 +204,23 @@ class RegulatedPurePursuitController(LeavesContacts, PursuitSteering):
         if command.vx != 0.0:  # a robot that may creep as far as the check time allows ends up at the obstacle
             duration = max(duration, shortest / max(abs(command.vx), SLOWEST))
         duration /= cycle.limit_factor
-        if command.vx != 0.0:  # it stops at a cusp
-            duration = min(duration, cycle.tracker.to_cusp / abs(command.vx))
-        elif command.wz != 0.0:  # and where it has turned to what it turns to
-            duration = min(duration, abs(self._angle_left(cycle)) / abs(command.wz))
-        outline_speed = abs(command.vx) + abs(command.wz) * cycle.footprint.footprint.circumscribed_radius
-        # Half a cell of the outline from pose to pose, and among them those of the next cycles.
-        period = self.parameters.control_period
-        step = period / math.ceil(period * outline_speed / (0.5 * cycle.costmap.resolution) + 1e-9)
-        pose = cycle.request.pose
-        poses = arc_poses((pose.x, pose.y, pose.yaw), command.vx, 0.0, command.wz, max(duration, step), step)
+        poses, step = (self._rolled if rolls else self._driven)(cycle, command, duration)
         hit = cycle.first_collision(poses)
         if hit < 0:
             return ""
         x, y = poses[hit, 0], poses[hit, 1]
         return obstacle_text(f"({x:.2f}, {y:.2f}) in {(hit + 1) * step:.2f} s")
+
+    def _driven(self, cycle: ControlCycle, command: Twist, duration: float) -> tuple[FloatArray, float]:
+        """Poses (n, 3) of the next ``duration`` [s] at most, and the time [s] between them."""
+        if command.vx != 0.0:  # it stops at a cusp
+            duration = min(duration, cycle.tracker.to_cusp / abs(command.vx))
+        elif command.wz != 0.0:  # and where it has turned to what it turns to
+            duration = min(duration, abs(self._angle_left(cycle)) / abs(command.wz))
+        outline_speed = abs(command.vx) + abs(command.wz) * cycle.footprint.footprint.circumscribed_radius
+        step, pose = self._step(cycle, outline_speed), cycle.request.pose
+        driven = command.vx, 0.0, command.wz, max(duration, step), step
+        return arc_poses((pose.x, pose.y, pose.yaw), *driven), step
 
     def _blocked_at_goal(self, cycle: ControlCycle, command: Twist) -> str:
         """Where a turn at the goal leads into an obstacle before the robot has its heading; empty if it does not.
@@ -207,9 +230,7 @@ class RegulatedPurePursuitController(LeavesContacts, PursuitSteering):
         turn, now = self._turn_at_goal(cycle) or 0.0, cycle.request.velocity.wz
         brakes = command.wz * turn < 0.0 and abs(command.wz) < abs(now) and command.wz * now > 0.0
         angle = 0.5 * command.wz**2 / self.parameters.acc_lim_theta if brakes else turn_left(turn, command)
-        resolution = cycle.costmap.resolution
-        step = SWEEP_STEP * resolution / max(cycle.footprint.footprint.circumscribed_radius, resolution)
-        poses = swept_poses(cycle.request.pose, math.copysign(angle, command.wz), step)
+        poses = swept_poses(cycle.request.pose, math.copysign(angle, command.wz), sweep_step(cycle))
         hit = cycle.first_collision_of_turn(poses)
         x, y, yaw = poses[hit]
         return obstacle_text(f"({x:.2f}, {y:.2f}, {yaw:.2f} rad)") if hit >= 0 else ""

@@ -127,16 +127,26 @@ def curves_ahead(turn: Twist, bearing: float, backward: bool = False) -> list[Tw
 
 
 def along_path(
-    tracker: PathTracker, pose: Pose, backward: bool = False, distances: Sequence[float] = NEAR
+    tracker: PathTracker,
+    pose: Pose,
+    backward: bool = False,
+    distances: Sequence[float] = NEAR,
+    *,
+    rolls_on: float = 0.0,
 ) -> list[Twist]:
     """Creeping along arcs to points close ahead on a path seen from above, forward or backward as it is to be driven.
 
     Where the outline fits on the path (``poses_ahead``) these arcs are free although the one to a point farther ahead,
     which cuts the path's corners, is not. None where the robot does not look along the path.
+
+    Parameters
+    ----------
+    rolls_on : float
+        Length [m] that the robot rolls before it creeps; the points lie so much farther ahead.
     """
     motions = []
     for distance in distances:
-        x, y = tracker.straight_on(distance).tolist()
+        x, y = tracker.straight_on(distance + rolls_on).tolist()
         bearing, curvature = arc_to(pose, np.array([x, y, pose.z]))
         if abs(off_course(bearing, backward)) <= LOOKS_ALONG:
             speed = -CREEPING if backward else CREEPING
@@ -144,15 +154,15 @@ def along_path(
     return motions
 
 
-def angle_to_path(tracker: PathTracker, pose: Pose, backward: bool = False) -> float:
+def angle_to_path(tracker: PathTracker, pose: Pose, backward: bool = False, rolls_on: float = 0.0) -> float:
     """Angle [rad] to the nearest of those points; one farther ahead may lie behind a corner."""
-    x, y = tracker.straight_on(NEAR[-1]).tolist()
+    x, y = tracker.straight_on(NEAR[-1] + rolls_on).tolist()
     return off_course(arc_to(pose, np.array([x, y, pose.z]))[0], backward)
 
 
-def closely_along_path(tracker: PathTracker, pose: Pose, backward: bool = False) -> list[Twist]:
+def closely_along_path(tracker: PathTracker, pose: Pose, backward: bool = False, rolls_on: float = 0.0) -> list[Twist]:
     """The same to points of ``CLOSE``, then wider curves than to the first of them."""
-    motions = along_path(tracker, pose, backward, CLOSE)
+    motions = along_path(tracker, pose, backward, CLOSE, rolls_on=rolls_on)
     return [*motions, *wider_curves(motions[0])[1:]] if motions else []
 
 

@@ -7,8 +7,8 @@ to the other side there. Nor where something stands on the path; samples lead ar
 Rule: a place is tight where the outline fits on the path, but has less than twice ``ROOM`` to move sideways in all; so
 is a cusp where the robot cannot turn, as a manoeuvre fits only as it was planned. Controllers keep to the path from
 ``REACH`` before such a place on, and closely from ``CLOSE_FROM`` on, so that the robot has come onto its path where the
-gap begins. The end of a path is no tight place, as many a goal lies beside a wall; but it is one once the way to the
-point ahead was blocked so near before it.
+gap begins; ``speed_before`` says how fast it may be before that. The end of a path is no tight place, as many a goal
+lies beside a wall; but it is one once the way to the point ahead was blocked so near before it.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import numpy as np
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Command, FloatArray, Pose, Twist
 from mbf_abstract.geometry.arithmetic import arctan2
+from mbf_abstract.maps.controllers.room_to_turn import CREEPING
 from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 
@@ -63,24 +64,26 @@ class TightPlaces:
             moved._close_until = self._close_until + shift
         return moved
 
-    def distance(self, tracker: PathTracker, reverses: bool, fits: Fits) -> float:
-        """Length [m] along the path to the next tight place, whatever cusps lie between; inf = none within ``REACH``.
+    def distance(self, tracker: PathTracker, reverses: bool, fits: Fits, reach: float = REACH) -> float:
+        """Length [m] along the path to the next tight place, whatever cusps lie between; inf = none within ``reach``.
 
         Parameters
         ----------
         reverses : bool
             Whether the robot drives backward where the poses of the path look against its direction.
+        reach : float
+            [m] More than ``REACH`` for a robot that needs more to brake before it is driven closely.
         """
         if self.is_close(tracker):
             return 0.0
         if tracker.progress - self._asked_at >= KEPT:
             self._asked_at = tracker.progress
-            lengths = np.arange(tracker.progress, min(tracker.progress + REACH, tracker.length), SPACING)
+            lengths = np.arange(tracker.progress, min(tracker.progress + reach, tracker.length), SPACING)
             poses = _poses_at(tracker, lengths, reverses).tolist()
             first = next((k for k, (x, y, yaw) in enumerate(poses) if not has_room(x, y, yaw, fits)), None)
             is_tight = first is not None and (fits(*poses[first]) or _fits_as_planned(tracker, lengths[first], fits))
             gap = float(lengths[first]) if is_tight else math.inf
-            self._next = min(gap, _next_cusp(tracker, fits))
+            self._next = min(gap, _next_cusp(tracker, fits, reach))
         return max(self._next - tracker.progress, 0.0)
 
     def drives_otherwise(self, tracker: PathTracker, wanted: Twist, command: Command | None) -> bool:
@@ -92,7 +95,8 @@ class TightPlaces:
         if not isinstance(command, Twist) or command == wanted:
             return False
         if command.vx == 0.0:
-            self._close_until = max(self._close_until, tracker.progress + KEPT)
+            if command.wz != 0.0:
+                self._close_until = max(self._close_until, tracker.progress + KEPT)
             return False
         near_end = wanted.vx != 0.0 and _ends_near(tracker)
         is_new = near_end and self._close_until < math.inf
@@ -113,6 +117,11 @@ class TightPlaces:
         return tracker.cusp_reached <= CLOSELY and tracker.begin_next_section()
 
 
+def speed_before(distance: float, deceleration: float) -> float:
+    """Speed [m/s] of a robot ``distance`` [m] before a tight place that creeps where it is to be driven closely."""
+    return math.sqrt(CREEPING**2 + 2.0 * deceleration * max(distance - CLOSE_FROM, 0.0))
+
+
 def _poses_at(tracker: PathTracker, lengths: FloatArray, reverses: bool) -> FloatArray:
     """Poses (n, 3: x, y [m], yaw [rad]) at lengths (n,) [m] along a path, each with the heading of its stroke."""
     strokes = np.searchsorted(tracker.cusps, lengths, side="right")
@@ -130,11 +139,11 @@ def _ends_near(tracker: PathTracker) -> bool:
     return tracker.on_last_section and tracker.remaining <= CLOSE_FROM
 
 
-def _next_cusp(tracker: PathTracker, fits: Fits) -> float:
-    """Length [m] of the next cusp within ``REACH`` at which the robot cannot turn, but for the end; inf = none."""
+def _next_cusp(tracker: PathTracker, fits: Fits, reach: float) -> float:
+    """Length [m] of the next cusp within ``reach`` [m] at which the robot cannot turn, but for the end; inf = none."""
     cusps: list[float] = tracker.cusps[:-1].tolist()
     for cusp in cusps:
-        if tracker.progress <= cusp <= tracker.progress + REACH:
+        if tracker.progress <= cusp <= tracker.progress + reach:
             x, y = tracker.point_at(cusp)[:2].tolist()
             if not all(fits(x, y, yaw) for yaw in HEADINGS.tolist()):
                 return cusp

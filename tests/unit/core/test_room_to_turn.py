@@ -137,6 +137,13 @@ def test_the_poses_ahead_are_those_of_a_robot_on_the_path(backward):
     assert len(poses_ahead(tracker, 0.4, backward)) == 1
 
 
+def test_a_robot_that_still_rolls_steers_to_points_beyond_where_it_creeps():
+    tracker = PathTracker(Path.from_points([(0.0, 0.1, 0.0), (3.0, 0.1, 0.0)]), dimensions=2)
+    tracker.update((0.0, 0.0))
+    for near, far in zip(along_path(tracker, HERE), along_path(tracker, HERE, rolls_on=0.4), strict=True):
+        assert 0.0 < far.wz < 0.5 * near.wz
+
+
 def test_a_robot_that_looks_elsewhere_does_not_creep_along_its_path():
     assert along_path(quarter_circle(False), Pose.planar(0.0, 0.0, 2.0)) == []
 

@@ -33,6 +33,10 @@ def test_in_the_gap_it_is_zero_and_a_gap_beyond_the_reach_does_not_count():
     assert TightPlaces().distance(tracker_at(0.0), True, gap(REACH + 0.1, 2.0, 0.02, 0.02)) == math.inf
 
 
+def test_who_needs_longer_to_brake_looks_farther():
+    assert TightPlaces().distance(tracker_at(0.0), True, gap(2.5, 3.0, 0.02, 0.02), 3.0) == pytest.approx(2.5, abs=0.1)
+
+
 @pytest.mark.parametrize(("left", "right"), [(0.0, 2 * ROOM), (2 * ROOM, 0.0), (2 * ROOM, 2 * ROOM)])
 def test_room_to_one_side_is_room_as_along_a_wall(left, right):
     assert TightPlaces().distance(tracker_at(0.5), True, gap(1.0, 2.0, left, right)) == math.inf
@@ -131,6 +135,11 @@ def test_once_the_way_was_blocked_near_its_end_the_rest_of_a_path_is_tight(at, i
 def test_a_way_that_was_blocked_before_a_cusp_or_a_turn_says_nothing_of_the_end():
     assert not TightPlaces().drives_otherwise(out_and_back(0.9), WANTED, CURVE)
     assert not TightPlaces().drives_otherwise(tracker_at(3.5), TURN, CURVE)
+
+
+def test_a_robot_that_brakes_does_not_turn_to_its_path():
+    places = TightPlaces()
+    assert not places.drives_otherwise(tracker_at(1.0), WANTED, Twist()) and not places.is_close(tracker_at(1.0))
 
 
 def test_a_robot_that_turns_to_its_path_keeps_to_it_closely_until_it_has_come_on():
