@@ -44,6 +44,10 @@ class Pose:
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "orientation", orientation)
 
+    def __str__(self) -> str:
+        x, y, z = self.position
+        return f"({x:.2f}, {y:.2f}, {z:.2f}) m, yaw {self.yaw:.2f} rad, in {self.frame_id!r}"
+
     @classmethod
     def planar(
         cls, x: float, y: float, yaw: float = 0.0, z: float = 0.0, frame_id: str = "map", stamp: float = 0.0

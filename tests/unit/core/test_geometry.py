@@ -159,3 +159,7 @@ def test_a_standing_car_may_keep_its_wheels_turned():
     assert not AckermannCommand(0.1, 0.0).is_stopped()
     assert Twist.planar(0.001, 0.0, 0.001).is_stopped()
     assert not Twist.planar(wz=0.01).is_stopped()
+
+
+def test_a_pose_is_printed_as_place_heading_and_frame():
+    assert str(Pose.planar(1.0, 2.006, 0.5, frame_id="odom")) == "(1.00, 2.01, 0.00) m, yaw 0.50 rad, in 'odom'"
