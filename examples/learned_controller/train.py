@@ -1,6 +1,6 @@
 """Train the policy by the cross-entropy method: five minutes of CPU time on each of two cores, with numpy alone.
 
-    pip install 'mbf-flex[sim,gym]'
+    pip install '.[sim,gym]'
     python examples/learned_controller/train.py
 
 A training that was stopped goes on after its last generation, with the same numbers as without the stop.

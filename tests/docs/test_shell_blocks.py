@@ -62,6 +62,13 @@ def test_every_command_of_a_page_is_read_by_the_command_line(page, mbf):
                 pytest.fail(f"{shlex.join(words)}: {error}")
 
 
+def test_every_block_names_its_language():
+    """One without a name would not be looked at here, nor by the tests of YAML and Python."""
+    for page in PAGES:
+        fences = re.findall(r"^ *```(.*)$", page.read_text("utf-8"), re.MULTILINE)
+        assert all(fences[::2]) and not any(fences[1::2]), page.name
+
+
 def test_a_command_that_does_not_exist_or_has_a_wrong_value_is_not_read(mbf):
     for wrong in ("drive indoor", "run indoor --sped 3", "run indoor --seed three", "plan map.yaml --start 1 2"):
         with pytest.raises(Exception, match=r"[Nn]o such|a valid integer|[Mm]issing"):
