@@ -10,6 +10,8 @@ from abc import abstractmethod
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath, MotionLimits, cannot_turn_ahead
@@ -23,7 +25,7 @@ from mbf_costmap_nav.plugins import CostmapContext
 
 LOOK, LOOK_STEP = 0.5, 0.1  # s
 AHEAD = 2.0
-"""A place where the robot cannot turn counts so many radii of its outline ahead."""
+"""A place where the robot cannot turn counts so many radii of its outline ahead; for a car, a quarter circle more."""
 
 
 class SamplingParameters(PluginParameters):
@@ -51,6 +53,11 @@ class SamplingFollower(PathFollower):
     def is_leaving(self) -> bool:
         """Whether the robot is leaving a contact."""
         return self._keeping.is_leaving
+
+    @property
+    def turning_radius(self) -> float:
+        """Radius [m] of the tightest curve of a car; 0 = the robot turns on the spot."""
+        return 0.0
 
     @abstractmethod
     def limits(self, cycle: ControlCycle) -> MotionLimits:
@@ -92,14 +99,17 @@ class SamplingFollower(PathFollower):
         )
 
     def _is_narrow(self, cycle: ControlCycle) -> bool:
-        """Whether the robot stops or reverses near ahead where it cannot turn."""
-        footprint = cycle.footprint
+        """Whether the robot stops or reverses near ahead where it cannot turn; for a car, whether it does near by.
+
+        A car that cuts the curve before a cusp, or before a narrow goal, cannot make up for it behind it.
+        """
+        footprint, tracker = cycle.footprint, cycle.tracker
+        reach = AHEAD * footprint.footprint.circumscribed_radius + 0.5 * math.pi * self.turning_radius
+        if self._keeping.car is not None and (np.abs(tracker.cusps[:-1] - tracker.progress) <= reach).any():
+            return True
         if math.isclose(footprint.footprint.circumscribed_radius, footprint.footprint.inscribed_radius, rel_tol=0.1):
             return False  # a round one turns where it fits
-        reach = AHEAD * footprint.footprint.circumscribed_radius
-        return cannot_turn_ahead(
-            cycle.tracker, reach, lambda poses: footprint.first_collision(cycle.costmap, poses) < 0
-        )
+        return cannot_turn_ahead(tracker, reach, lambda poses: footprint.first_collision(cycle.costmap, poses) < 0)
 
 
 def keeps_centre_free(cycle: ControlCycle, command: Twist) -> bool:

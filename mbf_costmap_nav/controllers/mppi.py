@@ -7,8 +7,8 @@ Known failure: the mean of two equally good paths around an obstacle may collide
 the best single sample. A robot that can turn on the spot turns to a path that begins behind it. A car turns onto a path
 at a right angle to its heading, but slowly where its turning radius is larger than its horizon
 (``max_vel_x * time_steps * model_dt``); a car that faces back along its path drives it backward and ends with the wrong
-heading. Give it paths that begin with its heading, as ``costmap.hybrid_astar`` does; it drives their cusps, and
-requests a new plan (NO_VALID_CMD) where it stands beside its goal.
+heading. Give it paths that begin with its heading, as ``costmap.hybrid_astar`` does; near their cusps, and before goals
+where it cannot turn, it keeps to them, and requests a new plan (NO_VALID_CMD) where it stands beside its goal.
 
 Formula: information-theoretic MPPI (Williams et al. 2018, algorithm 2), with Nav2's structure of critics; the noise
 comes from a pool drawn once from the plugin's generator, so that a cycle draws only an index. Deviation: the noise is
@@ -30,6 +30,7 @@ from mbf_abstract.maps.tracking.avoidance import MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlResult, PlannedMotion
+from mbf_costmap_nav.control.car_on_path import car_on_path
 from mbf_costmap_nav.control.path_handling import ControlCycle
 from mbf_costmap_nav.control.sampling_follower import SamplingFollower, SamplingParameters
 from mbf_costmap_nav.control.sampling_noise import correlated_noise, smoothing_matrix
@@ -96,7 +97,7 @@ class MPPIController(SamplingFollower):
 
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)
-        p = self.parameters
+        self._context, p = context, self.parameters
         shape = (NOISE_POOL, 3, p.time_steps, p.batch_size)
         self._noise = correlated_noise(self.rng, shape, math.exp(-p.model_dt / p.noise_correlation_time))
         self._velocities = np.empty(shape[1:], dtype=np.float32)
@@ -117,6 +118,11 @@ class MPPIController(SamplingFollower):
         self._deviation = np.array(deviation, dtype=np.float32)
         self._radius = self.turning_radius
         self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0)
+        if self._radius > 0.0:
+            names = "max_vel_x", "max_vel_theta", "acc_lim_x", "max_path_distance"
+            limits = {"min_turning_radius": self._radius, "allow_reversing": p.min_vel_x < 0.0}
+            car = car_on_path(self._context, limits | {name: getattr(p, name) for name in names})
+            car.tracker, self._keeping.car = self.tracker, car
 
     def limits(self, cycle: ControlCycle) -> MotionLimits:
         """Those of the samples."""

@@ -25,7 +25,8 @@ from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.mesh.topology import group_of_each
 
 POINTS_PER_CELL = 4.0
-SMALLEST_CELL, LARGEST_CELL, CELL_STEP = 0.05, 1.0, 0.05
+SMALLEST_CELL, LARGEST_CELL, CELL_STEP = 0.1, 1.0, 0.05
+"""[m] What a tripod scans in the middle of a yard would do for cells of 5 cm: four times the vertices, less even."""
 STOREY = 2.5
 LEAST_POINTS = 100
 CROWN_UPWARD = 0.7071
@@ -37,7 +38,11 @@ class SurfaceParameters(ParameterModel):
     """How points become a surface; the defaults suit a robot of a metre's size outdoors."""
 
     cell: float = parameter(
-        0.0, "Distance between the vertices; 0 = from the density, about four points a cell.", unit="m", ge=0.0, le=10.0
+        0.0,
+        "Distance between the vertices; 0 = from the density, about four points a cell, 0.1 to 1 m.",
+        unit="m",
+        ge=0.0,
+        le=10.0,
     )
     outlier_points: int = parameter(
         4, "Points with fewer points around them are errors; 1 = keep all. Around is up to twice the cell.", ge=1

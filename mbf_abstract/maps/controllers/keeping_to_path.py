@@ -2,7 +2,8 @@
 
 When to use: in every controller that chooses the best of sampled motions, on all maps. Near a wall the cheapest motion
 is often to stand: the price of the costs there outweighs what is left of the path. And samples cut the strokes of a
-manoeuvre, which fits only as it was planned. When not: cars, which ``follow_path`` cannot drive; they only give up.
+manoeuvre, which fits only as it was planned. When not: cars without a controller of their own for that (``car``), as
+``follow_path`` cannot drive them; they only give up.
 
 Rule: a path is driven as ``follow_path`` drives it, with the limits of the controller, before a place where the robot
 has to stop or reverse but cannot turn, or has hardly any room to either side (``tight_places``); and where the samples
@@ -32,10 +33,12 @@ from mbf_abstract.maps.controllers.tight_places import HEADINGS
 from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.tracking.avoidance import MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
 
 AWAY, AHEAD, FAR = 0.5, 0.25, 2.0
 """The robot samples again ``AWAY`` [m] from where it stood if it has come ``AHEAD`` on its path, else ``FAR``."""
+AT_END = 0.05
+"""A car so near [m] to the end of its path keeps to nothing: one with another heading needs a new plan."""
 FARTHEST = 100.0
 """However far [m] from its path the robot is, that is for the controller to judge."""
 LOOK, LOOK_STEP = 1.5, 0.1
@@ -93,6 +96,8 @@ class KeepingToPath:
         self._remained = math.inf
         self.is_keeping = False
         """Whether the last command was one along the path."""
+        self.car: AbstractController | None = None
+        """What keeps a car to its path; None = nothing does."""
 
     @property
     def is_leaving(self) -> bool:
@@ -111,6 +116,8 @@ class KeepingToPath:
     def set_plan(self, path: Path) -> None:
         """Take over a path. Where the robot stood is remembered, however often it is planned anew."""
         self._follower.set_plan(path)
+        if self.car is not None:
+            self.car.set_plan(path)
 
     def update(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Take over the progress, and the tolerances [m, rad] of the goal.
@@ -118,6 +125,8 @@ class KeepingToPath:
         Whether the robot has reached the goal as near as the path leads to it.
         """
         reached = self._follower.is_goal_reached(pose, dist_tolerance, angle_tolerance)
+        if self.car is not None:
+            self.car.is_goal_reached(pose, dist_tolerance, angle_tolerance)
         return reached and self._follower.ended_early
 
     def out_of_contact(self, request: ControlRequest, limits: MotionLimits) -> ControlResult | None:
@@ -160,7 +169,8 @@ class KeepingToPath:
             self._standing.commanded(out.command)
             return out
         along, reason = None, ""
-        keeps = not limits.is_car and (
+        drives = not limits.is_car or (self.car is not None and self._follower.remaining > AT_END)
+        keeps = drives and (
             self._has_stood(request.pose, stood >= p.keep_to_path_after)
             or is_narrow()
             or self._follower.to_tight_place(request.pose) < math.inf
@@ -168,7 +178,7 @@ class KeepingToPath:
         if keeps:
             along, reason = self._along_path(request, limits, around, accepts)
         result = along or sampled()
-        if not (result.success or keeps or limits.is_car):
+        if drives and not (result.success or keeps):
             along, _ = self._along_path(request, limits, around, accepts)
             if along:
                 self._stands_at(request.pose)
@@ -203,7 +213,8 @@ class KeepingToPath:
         self, request: ControlRequest, limits: MotionLimits, around: MovingAround, accepts: Callable[[Twist], bool]
     ) -> tuple[ControlResult | None, str]:
         """The answer that keeps to the path; None, and why, where it is blocked or somebody comes."""
-        answer = self._follower.compute_velocity_commands(request)
+        follower = self.car if limits.is_car and self.car is not None else self._follower
+        answer = follower.compute_velocity_commands(request)
         if not isinstance(answer.command, Twist) or not answer.success:
             return None, answer.message
         command = limits.hold(answer.command, request.velocity)

@@ -11,6 +11,7 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_costmap_nav.control.close_steering import STEERINGS
+from mbf_costmap_nav.controllers.mppi import MPPIController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
@@ -78,7 +79,7 @@ def drive(controller, path, start, seconds=120.0, radius=RADIUS):
         if not result.success:
             return result.outcome, np.array(beside)
         velocity = result.command
-        assert abs(velocity.wz) * radius <= abs(velocity.vx) + 1e-9
+        assert abs(velocity.wz) * radius <= abs(velocity.vx) * (1.0 + 1e-6) + 1e-9
         turn = 0.05 * velocity.wz
         x, y = (
             (pose.x + 0.05 * velocity.vx * math.cos(pose.yaw + 0.5 * turn)),
@@ -169,3 +170,17 @@ def test_cars_of_all_sizes_keep_to_their_paths(
     controller = make_plugin(RegulatedPurePursuitController, grid, max_vel_x=speed, **car)
     ending, beside = drive(controller, result.path, start, radius=radius)
     assert ending == "arrived" and beside[:, 0].max() < beside_path
+
+
+@pytest.mark.parametrize("goal", [(4.0, 1.6, 0.5 * math.pi), (4.0, 2.2, -0.5 * math.pi)], ids=["backward", "forward"])
+def test_mppi_keeps_a_car_to_the_manoeuvre_that_its_samples_would_cut(make_plugin, goal):
+    grid, start = bay(0.7), (1.2, 3.6, 0.0)
+    path, _ = planned(make_plugin, grid, start, goal)
+    car = {"footprint": CAR, "turning_radius": RADIUS}
+    controller = make_plugin(MPPIController, grid, motion_model="ackermann", batch_size=500, **car)
+    assert drive(controller, path, start)[0] == "arrived"
+    controller.parameters = controller.parameters.model_copy(update={"max_vel_x": 0.2})
+    controller.parameters_changed()
+    assert controller.set_plan(path)
+    command = controller.compute_velocity_commands(ControlRequest(Pose.planar(*start), Twist())).command
+    assert 0.0 < abs(command.vx) <= 0.2

@@ -107,6 +107,14 @@ def test_storeys_do_not_make_the_cells_smaller(rng):
     assert cell_for(floor) == cell_for(np.vstack([np.add(floor, (0.0, 0.0, 3.1 * level)) for level in range(4)])) == 0.2
 
 
+def test_a_dense_scan_does_not_make_the_cells_finer_than_a_robot_needs_and_its_map_is_more_even(rng):
+    points = np.vstack([ground(rng, hills, size=(8.0, 6.0)) for _ in range(20)])
+    assert cell_for(points) == 0.1
+    chosen, finer = (build_surface(points, SurfaceParameters(cell=cell)) for cell in (0.0, 0.05))
+    errors = [np.std(each.vertices[:, 2] - hills(*each.vertices[:, :2].T)) for each in (chosen, finer)]
+    assert errors[0] < 0.8 * errors[1]
+
+
 def test_holes_are_filled_up_to_the_width_and_stay_where_they_are_wider(rng):
     points = ground(rng, hills)
     for x, y, radius in ((4.0, 6.0, 0.35), (11.0, 6.0, 1.5)):
