@@ -167,7 +167,8 @@ class CostmapNavigationServer(MapServer):
         try:
             content = load_map(file).axis_aligned()
         except MapError as error:
-            found = error.findings or [Finding(str(error.file), 1, "", "a map", error.reason)]
+            expected, _, got = error.reason.removeprefix("expected ").rpartition(", got ")
+            found = error.findings or [Finding(str(error.file), 1, "", expected or "a map", got)]
             raise ConfigError(found) from error
         return FloorMap(content.occupancy, content.resolution, *content.origin[:2])
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.installed_plugins import installed_points
 from mbf_abstract.config.yaml_source import read_yaml
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Command, Pose, Twist
@@ -20,7 +21,7 @@ from mbf_abstract.goals.goal_types import GetPathGoal, RefinePathGoal
 from mbf_abstract.goals.result_types import GetPathResult, RefinePathResult
 from mbf_abstract.maps.view import UNKNOWN_OCCUPANCY, FloorMap
 from mbf_abstract.navigator import Navigator
-from mbf_abstract.server.factory import installed_servers, read_config
+from mbf_abstract.server.factory import MAP_FILES_GROUP, installed_servers, read_config
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import Clock
@@ -101,7 +102,9 @@ def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavi
     if file.is_dir():
         expected = "a configuration, map or mesh file, or a folder of tiles (mbf map tile)"
         raise ConfigError([Finding(str(file), 1, "", expected, "a folder of something else")])
-    raise ConfigError([Finding(str(file), 1, "", "a format that an installed server reads", repr(file.suffix))])
+    endings = ", ".join(sorted(f".{point.name}" for point in installed_points(MAP_FILES_GROUP)))
+    expected = f"a configuration, map or mesh ({endings}); of a point cloud, mbf map build makes a mesh"
+    raise ConfigError([Finding(str(file), 1, "", expected, f"a file that ends with {file.suffix!r}")])
 
 
 def _unknown_note(floor: FloorMap | None, unknown: str) -> list[str]:

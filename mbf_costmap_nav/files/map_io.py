@@ -195,13 +195,13 @@ def _read_pixels(file: Path, max_cells: int, mode: MapMode) -> NDArray[np.uint8]
             if width * height > max_cells:
                 raise MapError(file, f"{width} x {height} pixels are more than the limit of {max_cells} cells")
             if image.mode not in GREY_MODES:
-                raise MapError(file, f"has pixels of type {image.mode!r}; expected 8-bit grey or colour")
+                raise MapError(file, f"expected 8-bit grey or colour, got pixels of type {image.mode!r}")
             has_opacity = "A" in image.mode or "transparency" in image.info
             pixels = np.asarray(image.convert("RGBA"), dtype=np.uint8)
     except Image.DecompressionBombError as error:
         raise MapError(file, f"has too many pixels: {error}") from error
     except UnidentifiedImageError as error:
-        raise MapError(file, "is not an image that can be read (pgm, png, bmp)") from error
+        raise MapError(file, "expected an image (pgm, png, bmp), got a file of another kind") from error
     except (OSError, ValueError, SyntaxError) as error:  # Pillow raises any of these for damaged files
         raise MapError(file, getattr(error, "strerror", None) or f"damaged image: {error}") from error
     channels = 4 if mode is MapMode.TRINARY and has_opacity else 3

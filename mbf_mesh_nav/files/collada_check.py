@@ -16,7 +16,7 @@ from mbf_mesh_nav.mesh.mesh_report import MeshError
 MAX_INSTANCES = 100_000
 """Uses of geometries in a scene; the largest of the field's own maps has a few hundred."""
 GEOMETRY, NODE_USE, NODE = "instance_geometry", "instance_node", "node"
-SCENES = "visual_scene"
+SCENES, SHOWN = "visual_scene", "instance_visual_scene"
 
 
 def check_collada(path: Path) -> None:
@@ -25,7 +25,8 @@ def check_collada(path: Path) -> None:
     Raises
     ------
     MeshError
-        Nodes instance each other in a cycle, or geometries are used more than ``MAX_INSTANCES`` times.
+        No scene is shown, nodes instance each other in a cycle, or geometries are used more than ``MAX_INSTANCES``
+        times.
     """
     from lxml import etree
 
@@ -36,6 +37,8 @@ def check_collada(path: Path) -> None:
     except (etree.XMLSyntaxError, ValueError) as error:
         raise MeshError(str(path), [f"cannot be read as dae: {error}"]) from error
     elements = [element for element in root.iter() if isinstance(element.tag, str)]
+    if not any(_name(element) == SHOWN for element in elements):
+        raise MeshError(str(path), [f"expected a <scene> with an <{SHOWN}>, got a file that shows nothing"])
     nodes = {element.get("id"): element for element in elements if _name(element) == NODE and element.get("id")}
     counts = _count_uses(nodes, path)
     for scene in elements:

@@ -18,6 +18,7 @@ from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.files.collada_check import check_collada
 from mbf_mesh_nav.files.file_frames import GLTF_FORMATS
 from mbf_mesh_nav.files.gltf_check import check_gltf
+from mbf_mesh_nav.files.obj_check import check_obj, refuse_obj_line
 from mbf_mesh_nav.files.plain_ply import read_plain_ply
 from mbf_mesh_nav.files.truncated_files import refuse_cut_file
 from mbf_mesh_nav.mesh.mesh_report import MeshError
@@ -57,10 +58,14 @@ def read_scene(path: Path, part: str, max_faces: int) -> MeshArrays:
             check_gltf(path)
         elif path.suffix.lower() == ".dae":
             check_collada(path)
+        elif path.suffix.lower() == ".obj":
+            check_obj(path)
         return _read(path, part, max_faces)
     except MeshError:
         raise
     except Exception as error:  # any parser error of any format; MemoryError of a lying header included
+        if path.suffix.lower() == ".obj":
+            refuse_obj_line(path)
         text = f"cannot be read as {path.suffix[1:].lower()}: {type(error).__name__}: {error}"
         raise MeshError(str(path), [text]) from error
 

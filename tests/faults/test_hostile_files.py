@@ -35,7 +35,7 @@ def test_a_postscript_file_called_png_starts_no_program(tmp_path, monkeypatch, r
     (tmp_path / "map.png").write_bytes(EPS)
     (tmp_path / "map.yaml").write_text(DESCRIPTION)
 
-    with pytest.raises(MapError, match="is not an image that can be read"):
+    with pytest.raises(MapError, match="got a file of another kind"):
         reads(tmp_path / "map.png", 0.05) if reads is load_image else reads(tmp_path / "map.yaml")
     assert not victim.exists()
 

@@ -196,6 +196,20 @@ def test_a_file_that_is_neither_map_nor_mesh_is_refused(tmp_path):
         assert "Traceback" not in result.output
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("cloud.pcd", "cloud.pcd:1: expected a configuration, map or mesh (.bmp, .dae,"),
+        ("cloud.pcd", "of a point cloud, mbf map build makes a mesh, got a file that ends with '.pcd'"),
+        ("photo.png", "photo.png:1: expected an image (pgm, png, bmp), got a file of another kind"),
+    ],
+)
+def test_a_file_of_a_kind_that_is_not_read_is_refused_with_what_is(tmp_path, name, said):
+    (tmp_path / name).write_text("hello")
+    result = mbf("plan", tmp_path / name, "--start", 1, 2, "--goal", 3, 4)
+    assert result.exit_code == 2 and said in " ".join(result.output.split()), result.output
+
+
 def test_plan_and_check_report_what_was_found_in_the_mesh_and_what_was_repaired(hill, tmp_path):
     mesh = trimesh.load(hill, process=False)
     faces = np.vstack([mesh.faces, mesh.faces[-1]])
