@@ -172,7 +172,7 @@ class NavigatorMessages:
         """The outline of the robot where it is, and the path that lies ahead of it."""
         if self._is_wanted(FOOTPRINT) and isinstance(self._server, MapServer):
             robot = self._server.runtime.robot
-            outline = list(self._server.served.values())[-1].map.robot_outline
+            outline = self._server.local_map.map.robot_outline
             try:
                 pose = robot.pose()
             except RobotStateError:

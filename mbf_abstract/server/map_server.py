@@ -1,7 +1,7 @@
 """A server on maps: scans, questions, freshness, changes at run time, written once for every backend.
 
 A backend's server derives ``MapServer``, builds its maps in ``serve_maps`` and hands them to plugins in
-``make_context``. The first map is the one plans are made on, the last one that on which the robot drives.
+``make_context``.
 """
 
 from __future__ import annotations
@@ -33,15 +33,10 @@ from mbf_abstract.server.plugin_host import ServerError
 
 
 class MapServer(AbstractNavigationServer):
-    """Navigation on maps.
-
-    Attributes
-    ----------
-    served : dict of str to ServedMap
-        The maps by the names of their sections.
-    """
+    """Navigation on maps."""
 
     served: dict[str, ServedMap[Any]]
+    """The maps by the names of their sections."""
 
     @abstractmethod
     def serve_maps(self, config: Config) -> Iterator[ServedMap[Any]]:
@@ -62,10 +57,19 @@ class MapServer(AbstractNavigationServer):
             served.report_configuration_warnings()
 
     @property
+    def global_map(self) -> ServedMap[Any]:
+        """The map that plans are made on: the first one."""
+        return next(iter(self.served.values()))
+
+    @property
+    def local_map(self) -> ServedMap[Any]:
+        """The map that the robot drives on: the last one, which may be the only one."""
+        return next(reversed(self.served.values()))
+
+    @property
     def queries(self) -> MapQueries:
         """The map-independent questions."""
-        maps = list(self.served.values())
-        return MapQueries(maps[0], maps[-1], self.runtime.robot, self.runtime.transforms)
+        return MapQueries(self.global_map, self.local_map, self.runtime.robot, self.runtime.transforms)
 
     @property
     def scans(self) -> Mapping[str, RangeScan]:
@@ -103,27 +107,25 @@ class MapServer(AbstractNavigationServer):
 
     def missing_floor(self) -> str:
         """That of the map that plans are made on; one that has come is taken up at once."""
-        served = next(iter(self.served.values()))
-        if served.map.missing_floor():
-            served.update()
-        return str(served.map.missing_floor())
+        if self.global_map.map.missing_floor():
+            self.global_map.update()
+        return str(self.global_map.map.missing_floor())
 
     def floors_taken(self) -> int:
         """Those of the map that plans are made on."""
-        return int(next(iter(self.served.values())).map.floors_taken)
+        return int(self.global_map.map.floors_taken)
 
     def map_problem(self, name: str = "") -> str:
         """Why a map is stale, by default the one that the robot drives on; empty while it is fresh.
 
         Plans are made on a stale map, too. Raises ServerError if there is no map of that name.
         """
-        served = self._served(name) if name else list(self.served.values())[-1]
-        reason: str = served.map.stale_reason(self.runtime.clock.now())
-        return reason
+        served = self._served(name) if name else self.local_map
+        return str(served.map.stale_reason(self.runtime.clock.now()))
 
     def path_problem(self, path: Path) -> str:
         """Where a path leaves the map that plans are made on; empty if it does not, or that is not known."""
-        navigation_map = next(iter(self.served.values())).map
+        navigation_map = self.global_map.map  # once, as a server may replace it
         with suppress(TransformError):
             there = self.runtime.transforms.transform_path(path, navigation_map.frame_id)
             return path_problem(navigation_map, path, there.positions)
@@ -136,11 +138,11 @@ class MapServer(AbstractNavigationServer):
     @property
     def robot_radius(self) -> float:
         """That of the outline on the map that the robot drives on."""
-        return float(norm(list(self.served.values())[-1].map.robot_outline).max())
+        return float(norm(self.local_map.map.robot_outline).max())
 
     def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
         """Slow down, or stop, in time before what moves on the map that the robot drives on."""
-        navigation_map = list(self.served.values())[-1].map
+        navigation_map = self.local_map.map
         try:
             there = self.runtime.transforms.transform_pose(pose, navigation_map.frame_id)
         except TransformError as error:
@@ -157,10 +159,9 @@ class MapServer(AbstractNavigationServer):
 
         Raises TransformError where the pose is not known on that map.
         """
-        navigation_map = list(self.served.values())[-1].map
+        navigation_map = self.local_map.map
         there = self.runtime.transforms.transform_pose(pose, navigation_map.frame_id)
-        reason: str = navigation_map.obstacle_ahead(there, command, duration)
-        return reason
+        return str(navigation_map.obstacle_ahead(there, command, duration))
 
     def avoid(self, places: Sequence[AvoidedPlace]) -> None:
         """Close these places on all maps, and no others; a map whose frame is not known to them stays as it is."""
@@ -202,7 +203,6 @@ class MapServer(AbstractNavigationServer):
             There is no such layer, or several maps have it.
         ValueError
             A value is not legal, the parameter is read once only (a ParameterError), or the layer does not take it.
-            Nothing is changed.
         """
         served, name = self._layer(layer)
         served.set_layer_parameters(name, changes)

@@ -42,7 +42,7 @@ class Observation:
         if map_name and map_name not in server.map_views:
             raise ValueError(f"--map: expected one of {', '.join(server.map_views)}, got {map_name!r}")
         self._server, self._robot, self._map_name, self._began = server, robot, map_name, began
-        served = server.served.get(map_name) or next(iter(server.served.values()))
+        served = server.served.get(map_name) or server.global_map
         self.frame_id: str = served.map.frame_id
         self._transform_tolerance: float = served.transform_tolerance
         self.poses_unknown = 0

@@ -86,7 +86,7 @@ class Episode:
         if self._control_period > runtime.gate.command_timeout:
             limit = f"at most the command_timeout of the configuration, {runtime.gate.command_timeout:g} s"
             raise ValueError(f"control_period: expected {limit}, got {self._control_period:g} s")
-        driven_on = list(server.served.values())[-1].map
+        driven_on = server.local_map.map
         self._observer = Observer(observed, driven_on, runtime.transforms, server.scans)
         self._makes_plans = observed.waypoints > 0
         self._goals = session.goals

@@ -209,7 +209,7 @@ class Session(SimulationSession):
 
     def _record_surroundings(self, time: float, server: MapServer) -> None:
         try:
-            near = list(server.served.values())[-1].map
+            near = server.local_map.map
             self.recorder.reports.outline(time, near.robot_outline)
             if server.local_view:
                 self.recorder.reports.local_map(time, near.frame_id, server.map_view(server.local_view))
@@ -220,7 +220,7 @@ class Session(SimulationSession):
         """What the map knows that the robot drives on, without starting its updates; in the frame of the world."""
         server, world = self.navigator.server, self.recorder.start.frame_id
         try:
-            known = list(server.served.values())[-1].tracked_objects() if isinstance(server, MapServer) else ()
+            known = server.local_map.tracked_objects() if isinstance(server, MapServer) else ()
             return [one.seen_from(server.runtime.transforms.lookup(world, one.frame_id)) for one in known]
         except TransformError:
             return []

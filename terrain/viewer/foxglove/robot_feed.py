@@ -136,7 +136,7 @@ class RobotFeed:
         if now < self._next_local_map or not self.is_watched() or not isinstance(server, MapServer):
             return
         self._next_local_map = now + LOCAL_MAP_PERIOD
-        near = list(server.served.values())[-1].map
+        near = server.local_map.map
         recorder.reports.outline(now + self._epoch, near.robot_outline)
         if server.local_view:
             recorder.reports.local_map(now + self._epoch, near.frame_id, server.map_view(server.local_view))
@@ -175,6 +175,5 @@ class RobotFeed:
 
 def _outline(server: object) -> FloatArray:
     """Corners (n, 2) [m] of the robot."""
-    served = next(iter(server.served.values()), None) if isinstance(server, MapServer) else None
-    outline = None if served is None else served.map.robot_box.outline()
+    outline = server.global_map.map.robot_box.outline() if isinstance(server, MapServer) else None
     return RobotBox.disc(DISC).outline() if outline is None or not np.ptp(outline) else outline
