@@ -262,7 +262,6 @@ class MoveBaseMachine:
 
     def _on_recovered(self, result: Any) -> End | None:
         self._recoveries.note_end(result.used_plugin, result.outcome)
-        self._oscillation.reset()
         self._ask_for_plan()
         return None
 

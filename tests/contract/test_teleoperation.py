@@ -2,7 +2,7 @@
 
 import pytest
 
-from mbf_abstract.drive.teleoperation import OWNER, Teleoperation
+from mbf_abstract.drive.teleoperation import DECELERATION, OWNER, REACTION_TIME, Teleoperation
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Twist
 from mbf_abstract.testing.conformance.rig import ROBOT_RADIUS, Box
@@ -75,6 +75,19 @@ def test_it_stops_before_an_obstacle_and_drives_away_from_it(driven):
     assert stopped_at.distance_to(pose) > 0.2, "it came nearer before"
     hold(driven, BACK, 1.0)
     assert stick.problem == "" and made.rig.robot.pose.x < stopped_at.x - 0.15
+
+
+def test_it_slows_down_where_it_must_to_stop_in_time(driven):
+    made, _ = driven
+    pose, gap = made.rig.robot.pose, 1.2
+    made.rig.boxes = [Box(pose.x + gap, pose.y - 1.0, pose.x + 1.7, pose.y + 1.0)]
+    made.rig.clock.sleep(0.5)
+    hold(driven, FORWARD, PERIOD)
+    while made.rig.robot.command.vx > 0.9 * FORWARD.vx:
+        gap = pose.x + 1.2 - made.rig.robot.pose.x - ROBOT_RADIUS
+        hold(driven, FORWARD, PERIOD)
+    needed = FORWARD.vx * REACTION_TIME + FORWARD.vx**2 / (2.0 * DECELERATION)
+    assert needed - 0.1 < gap < needed + 0.4, "what a mesh forbids begins up to a face before the obstacle"
 
 
 def test_a_goal_does_not_drive_while_somebody_does_and_may_afterwards(driven):

@@ -54,8 +54,9 @@ def test_time_over_is_pat_exceeded(world, run, name):
 
 @pytest.mark.parametrize("name", MOVING)
 def test_a_gate_that_refuses_is_stopped(world, run, name):
-    result, _ = run(name, world.map_of(before_the_wall), closed=True)
+    result, motion = run(name, world.map_of(before_the_wall), closed=True)
     assert result.outcome == RecoveryOutcome.STOPPED and "the velocity gate refused the command" in result.message
+    assert motion.seconds < 0.06, "two refusals in a row, one control period apart, are enough"
 
 
 @pytest.mark.parametrize("name", MOVING)

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from mbf_abstract.maps.layers.layer_list import LayerListError
-from mbf_costmap_nav.grid.costmap import CellBox
+from mbf_costmap_nav.grid.costmap import LETHAL, CellBox
 from mbf_costmap_nav.layers.inflation import InflationLayer
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.map.layer import CostmapLayer
@@ -98,3 +98,32 @@ def test_a_robot_too_large_for_the_cells_is_named_and_not_the_layer_that_is_wide
     expected = r"layer 'mine': the robot's inscribed radius is 393 cells of 0.05 m, at most 253 are possible"
     with pytest.raises(ValueError, match=expected):
         build_layered_costmap(parameters)
+
+
+def test_what_an_update_has_not_finished_is_in_the_map_after_the_next():
+    class Marking(ForeignLayer):
+        """Has one new cell in its first update, and none later."""
+
+        new, fails = True, True
+
+        def update_bounds(self, robot_pose, now, box):
+            self.new, new = False, self.new
+            return CellBox(3, 4, 4, 5) if new else box
+
+        def update_costs(self, cells, box):
+            if self.fails:
+                raise OSError("a file is gone")
+            if box.x0 <= 3 < box.x1 and box.y0 <= 4 < box.y1:
+                cells[4, 3] = LETHAL
+
+    parameters = CostmapParameters.model_validate({"robot_radius": 0.2, "layers": LAYERS[:1]})
+    costmap = build_layered_costmap(parameters, load_layer={"foreign": Marking}.__getitem__)
+    costmap.layers["mine"].fails = False
+    costmap.layers["mine"].new = False
+    costmap.update(None, 0.0)
+    costmap.layers["mine"].new = costmap.layers["mine"].fails = True
+    with pytest.raises(OSError, match="a file is gone"):
+        costmap.update(None, 1.0)
+    costmap.layers["mine"].fails = False
+    costmap.update(None, 2.0)
+    assert costmap.snapshot().cells[4, 3] == LETHAL and costmap.stale_reason(2.0) == ""

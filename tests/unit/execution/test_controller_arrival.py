@@ -87,6 +87,18 @@ def test_a_robot_that_slides_away_from_its_goal_each_time_has_missed_it(make_ses
     assert session.robot.command.is_stopped()
 
 
+def test_a_newer_goal_elsewhere_may_be_slid_away_from_as_often_as_the_first(make_session):
+    session = make_session(force_stop_at_goal=True, mbf_tolerance_exclusive=True)
+    session.robot.odometry = _sliding_back(session, [0.4] * 5)
+    session.controller.play(drive(0.2))
+    first = session.navigator.send(ExePathGoal(session.path_to(1.0), dist_tolerance=0.3))
+    while len([1 for event in session.recorded(EventKind.STATE_CHANGED) if event.data["new"] == "stopping"]) < 3:
+        session.clock.sleep(0.1)
+    session.clock.sleep(0.6)
+    second = session.navigator.send(ExePathGoal(session.path_to(3.0), dist_tolerance=0.3))
+    assert second.wait().success and first.wait().outcome == Outcome.CANCELED
+
+
 def test_a_controller_that_has_missed_the_goal_is_not_asked_again(make_session, states):
     session = make_session(controller_max_retries=-1, controller_patience=5.0)
     session.controller.play(drive(), ControlResult(Outcome.MISSED_GOAL, "past it"), drive())

@@ -302,3 +302,12 @@ def test_a_goal_whose_patience_ends_while_it_waits_for_the_instance_says_so(make
     assert session.clock.now() < 1.2
     assert len(session.planner.requests) == 1
     assert first.wait().success
+
+
+@pytest.mark.parametrize(("begin", "end", "accepted"), [(0.4, 0.4, True), (0.6, 0.0, False), (0.0, 0.6, False)])
+def test_ends_of_a_plan_may_be_off_by_the_tolerance_of_the_server_and_no_more(make_session, begin, end, accepted):
+    session = make_session(plan_end_tolerance=0.5, dist_tolerance=0.0)
+    session.planner.play(PlanResult(0, "", Path.from_points([(begin, 0, 0), (3.0 - end, 0, 0)])))
+    result = session.navigator.get_path(TARGET)
+    assert result.success is accepted
+    assert accepted or ("allowed 0.50 m" in result.message and result.outcome == Outcome.INTERNAL_ERROR)

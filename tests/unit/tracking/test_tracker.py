@@ -372,3 +372,18 @@ def test_an_object_is_expressed_in_another_frame():
     assert (there.x, there.y) == pytest.approx((1.0 - person.y, person.x))
     assert (there.vx, there.vy) == pytest.approx((-person.vy, person.vx))
     assert there.course == pytest.approx((-person.course[1], person.course[0])) and there.course[0] < -0.2
+
+
+def test_who_is_seen_in_few_scans_is_forgotten_in_half_the_time():
+    for scans, hidden, known in ((2, 4, 1), (2, 7, 0), (5, 7, 1), (5, 12, 0)):
+        tracker, _ = follow([*walk(2.0, -1.0, 0.0, 0.5, scans), *[None] * hidden])
+        assert len(tracker) == known, f"{scans} scans, then hidden for {hidden * PERIOD:.1f} s"
+
+
+def test_points_of_who_stops_are_no_longer_those_of_someone_who_moves():
+    places = [*walk(2.0, 0.0, 0.0, 0.8, 15), *[(2.0, 1.2)] * 25]
+    tracker, moving = Tracker(TrackingParameters(), "map"), []
+    for step, place in enumerate(places):
+        numbers = tracker.insert(disc(*place), SENSOR, step * PERIOD)
+        moving.append(bool(tracker.are_moving(numbers).any()))
+    assert moving[10] and moving[20] and not moving[-1]

@@ -17,7 +17,7 @@ from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
 from mbf_abstract.plugins import ControlResult
-from mbf_abstract.testing.faulty import slow
+from mbf_abstract.testing.faulty import drive, slow
 from mbf_abstract.testing.scripted import straight_plan
 
 VIA = (Pose.planar(1.0, 0.0), Pose.planar(1.0, 1.0))
@@ -166,6 +166,29 @@ def test_a_path_by_a_later_pose_first_passes_it_after_the_earlier_one():
     assert [pose.x for pose in via.left] == [1.0]
     via.note_progress(1.0, 0.1)
     assert via.left == ()
+
+
+def test_a_pose_is_passed_within_the_tolerance_and_a_plan_that_was_asked_for_before_does_not_bring_it_back():
+    path = Path.from_points([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0]])
+    via = ViaPoses([Pose.planar(1.0, 0.0), Pose.planar(3.0, 0.0)])
+    via.plan()
+    via.follow(path)
+    for to_go, count in ((3.2, 2), (3.05, 1)):
+        via.note_progress(to_go, 0.1)
+        assert len(via.left) == count
+    via.follow(path)
+    via.note_progress(2.9, 0.1)
+    assert [pose.x for pose in via.left] == [3.0]
+
+
+def test_a_robot_that_stands_where_its_goal_is_plans_on_while_poses_are_left(make_session):
+    session = make_session(planner_frequency=2.0)
+    session.controller.play(drive(0.0))
+    handle = session.send(0.05, via=(Pose.planar(2.0, 0.0),), dist_tolerance=0.01)
+    session.clock.sleep(3.2)
+    assert session.plans >= 6
+    handle.cancel()
+    assert handle.wait().outcome == Outcome.CANCELED
 
 
 def naive_rests(points, poses):
