@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from contextlib import ExitStack
 from enum import Enum
 from pathlib import Path
@@ -89,6 +90,8 @@ def _pose(name: str, place: Place, server: AbstractNavigationServer, notes: list
     if server.ground_is_level:
         place = place.on_flat_map()
     yaw = place.yaw or 0.0
+    if abs(yaw) > 2.0 * math.pi:
+        notes.append(f"the heading at the {name} is {yaw:g} rad, more than a turn: degrees are not meant")
     if place.z is not None:
         return Pose.planar(place.x, place.y, yaw, place.z, frame_id=server.config.parameters.global_frame)
     heights = server.ground_heights(place.x, place.y)

@@ -16,6 +16,7 @@ from mbf_abstract.geometry.arithmetic import rotated, rotated_back
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.physics.actors import AnyWorld
+from terrain.scenarios.places import FULL_TURN
 from terrain.sensors.proprioception import Localization
 from terrain.sensors.sensor import Sensor
 
@@ -47,7 +48,7 @@ class LocalizationJump(TimedFault):
     type: Literal["jump"]
     dx: float = parameter(0.0, "Error along x.", unit="m")
     dy: float = parameter(0.0, "Error along y.", unit="m")
-    dyaw: float = parameter(0.0, "Error of the heading.", unit="rad")
+    dyaw: float = parameter(0.0, "Error of the heading.", unit="rad", ge=-FULL_TURN, le=FULL_TURN)
 
 
 Fault = Annotated[SensorFault | LocalizationJump, Field(discriminator="type")]

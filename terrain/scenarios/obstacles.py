@@ -12,6 +12,7 @@ from pydantic import Field
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.physics.actors import AnyWorld
+from terrain.scenarios.places import FULL_TURN
 from terrain.worlds.surface import Surface, box, cylinder, joined
 
 DRAWS_PER_POST = 100
@@ -26,7 +27,7 @@ class Obstacle(ParameterModel):
     shape: Literal["box", "cylinder"] = parameter("box", "Its form.")
     x: float = parameter(..., "Position of its middle.", unit="m")
     y: float = parameter(..., "Position of its middle.", unit="m")
-    yaw: float = parameter(0.0, "Heading.", unit="rad")
+    yaw: float = parameter(0.0, "Heading.", unit="rad", ge=-FULL_TURN, le=FULL_TURN)
     size: Size = parameter((0.5, 0.5, 1.0), "Length, width, height; a cylinder's diameter.", unit="m")
 
 

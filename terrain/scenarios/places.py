@@ -9,13 +9,16 @@ import numpy as np
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.parameters import ParameterModel, parameter
 
+FULL_TURN = 6.2832
+"""Largest heading [rad]; what is beyond was meant in degrees."""
+
 
 class PlanarPose(ParameterModel):
     """A place on the ground."""
 
     x: float = parameter(..., "Position.", unit="m")
     y: float = parameter(..., "Position.", unit="m")
-    yaw: float = parameter(0.0, "Heading.", unit="rad")
+    yaw: float = parameter(0.0, "Heading.", unit="rad", ge=-FULL_TURN, le=FULL_TURN)
     z: float | None = parameter(None, "Height of the level that is meant; absent = the highest ground.", unit="m")
 
 

@@ -188,7 +188,11 @@ def _find_contradictions_of(scenario: Scenario, document: YamlDocument, at: Call
     for backend, file in scenario.navigation.items():
         if not file.is_file():
             findings.append(document.finding(at("navigation", backend), "a configuration file", f"no file {file}"))
-    sensors = [*(sensor.name for sensor in scenario.sensors), *proprioceptive_sensors(scenario), LOCALIZATION]
+    own = [sensor.name for sensor in scenario.sensors]
+    for index, name in enumerate(own):
+        if name in own[:index]:  # of two with one name only the last would be there
+            findings.append(document.finding(at("sensors", index, "name"), "a name of its own", repr(name)))
+    sensors = [*own, *proprioceptive_sensors(scenario), LOCALIZATION]
     for index, fault in enumerate(scenario.faults):
         if isinstance(fault, SensorFault) and fault.sensor not in sensors:
             expected = "one of " + ", ".join(sensors)

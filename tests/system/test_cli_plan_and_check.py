@@ -196,6 +196,11 @@ def test_a_file_that_is_neither_map_nor_mesh_is_refused(tmp_path):
         assert "Traceback" not in result.output
 
 
+def test_a_heading_in_degrees_is_noted():
+    result = mbf("plan", OFFICE, "--start", 3, 9.7, 90, "--goal", 12, 9.7)
+    assert "note: the heading at the start is 90 rad, more than a turn: degrees are not meant" in result.output
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [

@@ -54,6 +54,20 @@ def test_a_fault_of_an_unknown_sensor_is_refused_with_its_line(tmp_path):
     assert "localization" in finding.expected
 
 
+def test_two_sensors_of_one_name_are_refused_as_only_the_last_would_be_there(tmp_path):
+    text = PLAIN + "sensors:\n  - {type: planar, name: lidar}\n  - {type: rings, name: lidar}\n"
+    with pytest.raises(ConfigError) as caught:
+        load_scenario(scenario_file(tmp_path, text))
+    assert "sensors[1].name: expected a name of its own, got 'lidar'" in str(caught.value)
+
+
+@pytest.mark.parametrize("value", ["90", "-180.0"])
+def test_headings_in_degrees_are_refused(tmp_path, value):
+    with pytest.raises(ConfigError) as caught:
+        load_scenario(scenario_file(tmp_path, PLAIN.replace("y: 3.0}", f"y: 3.0, yaw: {value}}}")))
+    assert f"start.yaw: expected a number >= -6.2832 and <= 6.2832 rad, got {value}" in str(caught.value)
+
+
 def test_an_unknown_kind_of_world_is_refused(tmp_path):
     with pytest.raises(ConfigError):
         load_scenario(scenario_file(tmp_path, PLAIN.replace("type: generated", "type: moon")))
