@@ -89,7 +89,7 @@ class InflationLayer(CostmapLayer):
             name = "the robot's inscribed radius" if of_robot else "inflation_radius"
             raise ValueError(
                 f"layer {self.name!r}: {name} is {self._radius:g} cells of {self.geometry.resolution:g} m, "
-                f"at most {LARGEST_RADIUS} are possible"
+                f"at most {LARGEST_RADIUS} are possible; lengths are in metres"
             )
         self._cost_of_square = cost_table(
             self._radius, self.geometry.resolution, self._inscribed_radius, self.parameters.cost_scaling_factor

@@ -43,6 +43,8 @@ class ObstacleLayer(GridLayer):
 
     Parameters = ObstacleLayerParameters
     parameters: ObstacleLayerParameters
+    marks_obstacles = True
+    """It belongs before an inflation layer."""
 
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)

@@ -52,6 +52,8 @@ class RangeSensorLayer(CostmapLayer):
 
     Parameters = RangeSensorLayerParameters
     parameters: RangeSensorLayerParameters
+    marks_obstacles = True
+    """It belongs before an inflation layer."""
 
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)

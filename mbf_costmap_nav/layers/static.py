@@ -68,6 +68,8 @@ class StaticLayer(GridLayer):
     Parameters = StaticLayerParameters
     clearable = False
     parameters: StaticLayerParameters
+    marks_obstacles = True
+    """It belongs before an inflation layer."""
 
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)

@@ -74,11 +74,17 @@ class LayerAnswers(SnapshotAnswers):
         """What is legal but hardly meant: of each layer, none that inflates, and a window smaller than the robot."""
         with self._lock:
             warnings = [] if self.missing_floor() else super().configuration_warnings()
-            inflates = any(hasattr(layer.parameters, "inflation_radius") for layer in self.layers.enabled)
-            if self.layers and not inflates and self.inscribed_radius > 0.0:
+            inflating = [hasattr(layer.parameters, "inflation_radius") for layer in self.layers.enabled]
+            if self.layers and not any(inflating) and self.inscribed_radius > 0.0:
                 radius = f"{self.inscribed_radius:.2f} m"
                 text = f"no inflation layer: planners treat the robot, whose inscribed radius is {radius}, as a point"
                 warnings.append(text)
+            for number, layer in enumerate(self.layers.enabled):
+                if getattr(layer, "marks_obstacles", False) and any(inflating) and not any(inflating[number:]):
+                    text = (
+                        f"layer {layer.name!r} comes behind the last inflation layer, which inflates what is before it"
+                    )
+                    warnings.append(f"{text}: planners treat the robot as a point beside what {layer.name!r} marks")
             grid, reach = self.geometry, self.footprint.circumscribed_radius
             nearest = 0.5 * grid.resolution * min(grid.width, grid.height)
             if self.rolling_window and nearest < reach:

@@ -176,6 +176,12 @@ def test_a_robot_on_a_map_without_inflation_is_reported_and_a_point_is_not(build
     assert build("static").configuration_warnings() == build(robot_radius=0.5).configuration_warnings() == []
 
 
+def test_obstacles_behind_the_last_inflation_are_reported_as_nothing_inflates_them(build):
+    (warning,) = build("inflation", "static", robot_radius=0.5).configuration_warnings()
+    assert "layer 'static' comes behind the last inflation layer" in warning
+    assert build("obstacle", "inflation", "speed_limit", robot_radius=0.5).configuration_warnings() == []
+
+
 @pytest.mark.parametrize(("width", "reported"), [(4.0, True), (8.0, False)])
 def test_a_window_smaller_than_the_robot_is_reported(build, width, reported):
     window = {"robot_radius": 3.0, "rolling_window": True, "width": width, "height": 20.0}

@@ -68,6 +68,12 @@ def test_headings_in_degrees_are_refused(tmp_path, value):
     assert f"start.yaw: expected a number >= -6.2832 and <= 6.2832 rad, got {value}" in str(caught.value)
 
 
+def test_a_list_with_too_many_numbers_is_refused_in_words(tmp_path):
+    with pytest.raises(ConfigError) as caught:
+        load_scenario(scenario_file(tmp_path, PLAIN.replace("[12.0, 10.0]", "[12.0, 10.0, 3.0]")))
+    assert "world.size: expected a list of 2 items, got a list of 3 items" in str(caught.value)
+
+
 def test_an_unknown_kind_of_world_is_refused(tmp_path):
     with pytest.raises(ConfigError):
         load_scenario(scenario_file(tmp_path, PLAIN.replace("type: generated", "type: moon")))
