@@ -57,8 +57,8 @@ class CommandWriter:
         """Whether zero was the last command to the robot."""
         return stands_still(self.last_command)
 
-    def wait_until_free(self, limit: float) -> bool:
-        """Wait at most ``limit`` [s] for the end of the running call; returns whether it has ended."""
+    def wait_until_free(self, limit: float) -> None:
+        """Wait at most ``limit`` [s] for the end of the running call."""
         deadline = self._clock.now() + limit
         self._waiting += 1
         try:
@@ -66,7 +66,6 @@ class CommandWriter:
                 self._condition.wait(remaining)
         finally:
             self._waiting -= 1
-        return not self.busy
 
     def begin(self, command: Command) -> Command:
         """Announce a motion that ``deliver`` is to send; only while not ``busy``."""

@@ -249,3 +249,40 @@ def test_a_new_timeout_holds_from_the_moment_it_is_set(scene):
     scene.gate.command_timeout = 1.2
     scene.clock.sleep(2.0)
     assert scene.robot.commands == [(0.0, FORWARD), (1.2, Twist())]
+
+
+def test_a_command_waits_for_the_end_of_an_earlier_call_that_is_not_long(scene):
+    lease = scene.gate.acquire("a")
+    scene.robot.blocks = lambda command: True
+    scene.spawn(lambda: lease.send(FORWARD))
+    scene.clock.sleep(0.1)
+    scene.spawn(lambda: (scene.clock.sleep(0.2), scene.robot.free()))
+    assert lease.send(Twist.planar(0.2))
+    assert scene.clock.now() == pytest.approx(0.3)
+    assert scene.robot.commands[-1][1] == Twist.planar(0.2)
+
+
+def test_with_the_gate_of_a_robot_that_stands_its_watchdog_ends(scene):
+    scene.clock.sleep(1.0)
+    assert "velocity watchdog" in scene.clock.thread_names
+    scene.gate.close()
+    scene.clock.sleep(0.1)
+    assert "velocity watchdog" not in scene.clock.thread_names
+
+
+@pytest.mark.parametrize("how", ["revoke", "ask_stop"])
+def test_who_takes_a_lease_away_or_asks_for_a_stop_does_not_wait_for_the_timeout(scene, how):
+    lease = scene.gate.acquire("a")
+    lease.send(FORWARD)
+    scene.clock.sleep(0.1)
+    getattr(lease, how)("enough")
+    scene.clock.sleep(1.0)
+    assert scene.robot.commands == [(0.0, FORWARD), (0.1, Twist())]
+
+
+def test_what_is_no_command_through_a_lease_that_is_over_does_not_stop_who_drives_now(scene):
+    old = scene.gate.acquire("a")
+    old.release()
+    scene.gate.acquire("b").send(FORWARD)
+    assert not old.send("duck")
+    assert scene.robot.commands[-1] == (0.0, FORWARD)

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.execution.arrival import ArrivalCheck
 from mbf_abstract.execution.controller import ControllerExecution
 from mbf_abstract.execution.controller_state import Plan
@@ -309,6 +310,34 @@ def test_a_robot_that_ignores_its_commands_is_stuck(make_session, states):
     assert result.outcome == Outcome.ROBOT_STUCK
     assert end_state(states, session) == "robot_disabled"
     assert 2.0 < session.clock.now() < 2.2
+
+
+@pytest.mark.parametrize("command", [Twist.planar(0.5), Twist.planar(0.0, wz=0.5)], ids=["straight", "turning"])
+@pytest.mark.parametrize(("share", "stuck"), [(0.05, True), (0.2, False)])
+def test_a_robot_that_hardly_carries_out_its_commands_ignores_them(make_session, command, share, stuck):
+    session = make_session(cmd_vel_ignored_tolerance=2.0)
+    measured = Twist.planar(share * command.vx, wz=share * command.wz)
+    session.robot.odometry = lambda: Odometry(measured, session.clock.now())
+    session.controller.play(ControlResult(0, "", command))
+    handle = session.navigator.send(ExePathGoal(session.path_to(30.0)))
+    session.clock.sleep(4.0)
+    assert handle.done is stuck
+    handle.cancel()
+    assert handle.wait().outcome == (Outcome.ROBOT_STUCK if stuck else Outcome.CANCELED)
+
+
+def test_while_the_controller_computes_no_command_is_ignored(make_session):
+    session = make_session(cmd_vel_ignored_tolerance=2.0)
+    real, first_cycles = session.robot.odometry, 3
+
+    def odometry_of_a_robot_that_sets_off_late():
+        nonlocal first_cycles
+        first_cycles -= not session.robot.command.is_stopped()
+        return Odometry(Twist(), session.clock.now()) if first_cycles > 0 else real()
+
+    session.robot.odometry = odometry_of_a_robot_that_sets_off_late
+    session.controller.play(slow(session.clock, 3.0, session.controller.follow), session.controller.follow)
+    assert session.navigator.exe_path(session.path_to(2.0)).success
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0])
