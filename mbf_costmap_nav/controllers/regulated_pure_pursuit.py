@@ -17,6 +17,7 @@ from mbf_abstract.execution.path_tracker import CUSP_REACHED
 from mbf_abstract.geometry import FloatArray, Path, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.continued_path import carried_over
+from mbf_abstract.maps.controllers.driving_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.maps.controllers.end_of_path import at_exact_end, swept_poses, turn_left
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_goal, obstacle_text
 from mbf_abstract.maps.controllers.room_to_turn import (
@@ -42,7 +43,6 @@ from mbf_abstract.maps.controllers.tight_places import (
     TightPlaces,
     speed_before,
 )
-from mbf_abstract.maps.controllers.way_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_costmap_nav.control.close_steering import steer_closely
@@ -74,8 +74,8 @@ class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
             return cycle
         if self.turning_radius > 0.0 and (missed := missed_goal(cycle.tracker, request.pose, cycle.goal_tolerance)):
             return missed
-        if (way_out := self._way_out(cycle)) is not None:
-            return ControlResult(ExePathOutcome.SUCCESS, "", way_out)
+        if (drive_out := self._drive_out(cycle)) is not None:
+            return ControlResult(ExePathOutcome.SUCCESS, "", drive_out)
         motions = self._motions(cycle)
         result = self._checked(cycle, motions)
         if not self._at_goal and self._tight_places.drives_otherwise(cycle.tracker, motions[0], result.command):
@@ -87,7 +87,7 @@ class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
             return replace(result, command=self._slowed(command, request.velocity))
         return result
 
-    def _way_out(self, cycle: ControlCycle) -> Twist | None:
+    def _drive_out(self, cycle: ControlCycle) -> Twist | None:
         """The motion that leads straight out of what is touched; None for a car, at the goal and where none does."""
         pose, concerns = cycle.request.pose, self.rotates and self.leaving.concerns(self.costmap, cycle.request.pose)
         if not concerns or self._turn_at_goal(cycle) is not None:

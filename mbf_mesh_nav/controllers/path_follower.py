@@ -17,8 +17,8 @@ import numpy as np
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to, in_robot_frame
 from mbf_abstract.geometry.tangent_plane import heading_error
+from mbf_abstract.maps.controllers.driving_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_path
-from mbf_abstract.maps.controllers.way_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
@@ -102,7 +102,7 @@ class PathFollower(LeavesContacts, SurfaceFollower):
         missed = missed_path(self._tracker, self.parameters.max_path_distance * self.limit_factor)
         if missed and not self.is_leaving:
             return missed
-        if not is_turning and (out := self._way_out(pose)) is not None:
+        if not is_turning and (out := self._drive_out(pose)) is not None:
             return self._command(out.vx, out.wz)
         if is_turning:
             turn = self.parameters.turn_gain * heading_error(pose, approach.goal)
@@ -118,7 +118,7 @@ class PathFollower(LeavesContacts, SurfaceFollower):
         places = np.concatenate([here[None], self._tracker.points_at(self._tracker.progress + ahead)])
         return self.obstacle_along(places, self.parameters.max_surface_distance, self.parameters.cost_limit)
 
-    def _way_out(self, pose: Pose) -> Twist | None:
+    def _drive_out(self, pose: Pose) -> Twist | None:
         """The motion straight out of what the robot touches; None without one, or where it may drive on such ground."""
         if self.parameters.cost_limit > FORBIDDEN_COST or not self.leaving.concerns(self.mesh_map, pose):
             return None

@@ -20,7 +20,7 @@ from mbf_mesh_nav.files.file_frames import GLTF_FORMATS
 from mbf_mesh_nav.files.gltf_check import check_gltf
 from mbf_mesh_nav.files.obj_check import check_obj, refuse_obj_line
 from mbf_mesh_nav.files.plain_ply import read_plain_ply
-from mbf_mesh_nav.files.truncated_files import refuse_cut_file
+from mbf_mesh_nav.files.truncated_files import refuse_truncated_file
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 MeshArrays = tuple[FloatArray, NDArray[np.int64]]
@@ -53,7 +53,7 @@ def read_scene(path: Path, part: str, max_faces: int) -> MeshArrays:
         The file is damaged, cut off, has no such part or more than ``max_faces`` faces, counting every use of a mesh.
     """
     try:
-        refuse_cut_file(path)
+        refuse_truncated_file(path)
         if path.suffix.lower() in GLTF_FORMATS:
             check_gltf(path)
         elif path.suffix.lower() == ".dae":

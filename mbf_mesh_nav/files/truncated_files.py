@@ -31,7 +31,7 @@ PLY_LINES = {
 """What the lines of a PLY header are, by their first words."""
 
 
-def refuse_cut_file(path: Path) -> None:
+def refuse_truncated_file(path: Path) -> None:
     """Compare what a file promises with what is there.
 
     Raises

@@ -58,8 +58,8 @@ ALLOWED_PROSE = {
 }
 
 
-def words_of(name):
-    return {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)}
+def in_words(name):
+    return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
 
 
 def is_banned(word):
@@ -114,7 +114,18 @@ def test_identifiers_use_the_fields_terms():
         f"{where(file, line)} {name}"
         for file in FILES
         for name, line in identifiers(file)
-        if name not in ALLOWED_NAMES and any(map(is_banned, words_of(name)))
+        if name not in ALLOWED_NAMES and any(map(is_banned, in_words(name)))
+    }
+    assert sorted(offenders) == []
+
+
+def test_identifiers_use_the_fields_phrases():
+    offenders = {
+        f"{where(file, line)} {name}"
+        for file in FILES
+        for name, line in identifiers(file)
+        for phrase in PHRASES
+        if re.search(rf"\b{phrase}s?\b", " ".join(in_words(name)))
     }
     assert sorted(offenders) == []
 
@@ -166,11 +177,11 @@ def test_documentation_uses_the_fields_phrases():
 def test_files_are_named_in_the_fields_words():
     folders = ("docs", "tests", "examples", "benchmarks", *PACKAGES)
     names = [file for folder in folders for file in sorted((REPOSITORY / folder).rglob("*.py"))] + PAGES
-    assert [where(file, 1) for file in names if any(map(is_banned, words_of(file.stem)))] == []
+    assert [where(file, 1) for file in names if any(map(is_banned, in_words(file.stem)))] == []
 
 
 @pytest.mark.parametrize(
     ("name", "banned"), [("_tell_robot", True), ("ToldOnce", True), ("MAX_DOUBTS", True), ("intelligent_strips", True)]
 )
 def test_a_banned_word_is_found_in_every_style_of_name(name, banned):
-    assert any(map(is_banned, words_of(name))) is banned
+    assert any(map(is_banned, in_words(name))) is banned

@@ -8,7 +8,7 @@ import pytest
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.maps.controllers.way_out import Gears, OnPath, WayOut
+from mbf_abstract.maps.controllers.driving_out import DriveOut, Gears, OnPath
 from mbf_abstract.plugins import ControlRequest, PluginKind
 from mbf_abstract.testing.contract.rig import rig
 
@@ -82,7 +82,7 @@ def test_whoever_reaches_over_the_corner_of_a_pillar_touches_it(world):
 def test_who_turns_drives_out_as_soon_as_that_leads_out(world):
     """Somebody stood in the way when it chose to turn, and has left."""
     busy = world.inflated(lambda x, y: pillar(x, y) | (np.hypot(x - 2.5, y - 2.2) < 0.15))
-    free, way, turns = world.inflated(pillar), WayOut(), []
+    free, way, turns = world.inflated(pillar), DriveOut(), []
     pose = Pose.planar(2.83, 2.52, -2.4)
     turn = lambda angle: turns.append(angle) or Twist.planar(wz=1.0)  # noqa: E731
     assert way.command(busy, pose, -2.0, turn, Gears(), leads_out).wz == 1.0 and turns
@@ -96,7 +96,7 @@ def test_who_leads_out_steeply_drives_straight_else_it_turns(world):
         turns.clear()
         pose = Pose.planar(2.83, 2.52, yaw)
         turn = lambda angle: turns.append(angle) or Twist()  # noqa: E731
-        return WayOut().command(navigation_map, pose, bearing, turn, gears, leads_out)
+        return DriveOut().command(navigation_map, pose, bearing, turn, gears, leads_out)
 
     assert command(math.pi, Gears()).vx > 0.0, "it looks away from the face"
     assert command(0.0, Gears(reverses=True)).vx < 0.0, "it looks at it"
@@ -105,7 +105,7 @@ def test_who_leads_out_steeply_drives_straight_else_it_turns(world):
     command(0.0, Gears(), bearing=0.2)
     assert turns and abs(turns[0]) > 1.5, "away from its path, which does not"
     free = Pose.planar(2.5, 2.52)
-    assert WayOut().command(navigation_map, free, 0.0, Twist, Gears(), leads_out) is None, "it touches nothing"
+    assert DriveOut().command(navigation_map, free, 0.0, Twist, Gears(), leads_out) is None, "it touches nothing"
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_no_way_is_taken_where_the_path_leads_farther_in_or_along_what_is_touche
     xs, ys = start.x + offset + along * math.cos(yaw), start.y + along * math.sin(yaw)
     tracker = PathTracker(Path(np.column_stack([xs, ys, 0.0 * along])), dimensions=2)
     tracker.update((start.x, start.y))
-    chosen = WayOut().command(navigation_map, start, 0.0, Twist, Gears(reverses=True), OnPath(tracker, start))
+    chosen = DriveOut().command(navigation_map, start, 0.0, Twist, Gears(reverses=True), OnPath(tracker, start))
     assert (chosen is not None) == leads
 
 
@@ -137,7 +137,7 @@ class BetweenTwo:
 
 def test_a_robot_between_two_things_does_not_drive_to_and_fro():
     """From each the straight way out is back, to the other one; it did so until it counted as stuck."""
-    way, pose, speeds = WayOut(), Pose.planar(0.012, 0.0), []
+    way, pose, speeds = DriveOut(), Pose.planar(0.012, 0.0), []
     turn = lambda angle: Twist.planar(wz=math.copysign(1.0, angle))  # noqa: E731
     for _ in range(40):
         command = way.command(BetweenTwo(), pose, 0.0, turn, Gears(reverses=True), leads_out)
@@ -149,7 +149,7 @@ def test_a_robot_between_two_things_does_not_drive_to_and_fro():
 
 
 def test_a_way_is_kept_until_the_robot_is_clear(world):
-    navigation_map, way, pose = world.inflated(pillar), WayOut(), Pose.planar(2.83, 2.52, math.pi)
+    navigation_map, way, pose = world.inflated(pillar), DriveOut(), Pose.planar(2.83, 2.52, math.pi)
     driven = 0.0
     while (command := way.command(navigation_map, pose, 0.0, Twist, Gears(), leads_out)) is not None:
         pose, driven = moved(pose, command), driven + PERIOD * command.vx

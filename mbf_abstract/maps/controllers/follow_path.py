@@ -17,6 +17,7 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.controllers.continued_path import carried_over
+from mbf_abstract.maps.controllers.driving_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.maps.controllers.end_of_path import at_exact_end, turn_left
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_path, no_path, outside_map, storeys_off
 from mbf_abstract.maps.controllers.follow_path_parameters import FollowPathParameters
@@ -33,7 +34,6 @@ from mbf_abstract.maps.controllers.room_to_turn import (
 )
 from mbf_abstract.maps.controllers.tight_places import CLOSE_FROM, CLOSELY, TightPlaces, outline_fits
 from mbf_abstract.maps.controllers.turn_at_goal import TurnAtGoal, from_goal
-from mbf_abstract.maps.controllers.way_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.queries import AS_CONFIGURED, PADDED, CellState
 from mbf_abstract.outcomes import ExePathOutcome
@@ -106,7 +106,7 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
             there = self.on_map(pose)
             if self.navigation_map.point_check()(there).state is CellState.OUTSIDE:
                 return outside_map(f"({there.x:.2f}, {there.y:.2f})")
-            if (out := self.way_out(pose)) is not None:
+            if (out := self.drive_out(pose)) is not None:
                 return ControlResult(ExePathOutcome.SUCCESS, "", out)
             motions, along = self._motions(pose, tracker), lambda: self._along_path(pose, tracker, p.look_ahead_dist)
             command, obstacle = self._room_to_turn.choose(
@@ -122,7 +122,7 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
             return blocked_path(self.navigation_map, there, obstacle)
         return ControlResult(ExePathOutcome.SUCCESS, "", command)
 
-    def way_out(self, pose: Pose) -> Twist | None:
+    def drive_out(self, pose: Pose) -> Twist | None:
         """The motion straight out of what the robot touches at ``pose``, in the frame of the path; None without one."""
         tracker, there = self._tracker, self.on_map(pose)
         if tracker is None or self._turn_at_goal.is_turning or not self.leaving.concerns(self.navigation_map, there):

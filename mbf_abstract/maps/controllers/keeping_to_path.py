@@ -131,7 +131,7 @@ class KeepingToPath:
 
     def out_of_contact(self, request: ControlRequest, limits: MotionLimits) -> ControlResult | None:
         """The answer that leads straight out of what the robot touches; None for a car, and where there is none."""
-        out = self._follower.way_out(request.pose) if limits.leaves_contacts and not limits.is_car else None
+        out = self._follower.drive_out(request.pose) if limits.leaves_contacts and not limits.is_car else None
         if out is None:
             return None
         self.is_keeping = True

@@ -61,7 +61,7 @@ class Gears:
     """Whether it turns off a little, up to 0.5 rad, from a path that leads along what it touches, and not out."""
 
 
-class WayOut:
+class DriveOut:
     """The way a robot has chosen out of what it touches, from cycle to cycle."""
 
     def __init__(self) -> None:
@@ -150,9 +150,9 @@ class LeavesContacts:
     """What every controller that leaves contacts has."""
 
     @cached_property
-    def leaving(self) -> WayOut:
+    def leaving(self) -> DriveOut:
         """How it leaves the present contact."""
-        return WayOut()
+        return DriveOut()
 
     @property
     def is_leaving(self) -> bool:
