@@ -22,7 +22,7 @@ from mbf_abstract.goals.goal_types import FollowWaypointsGoal, MoveBaseGoal, Way
 from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.goals.result_types import FollowWaypointsResult, MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
-from mbf_abstract.time.clock import ThreadDetached
+from mbf_abstract.time.clock import TIME_RESOLUTION, ThreadDetached
 
 Handle = GoalHandle[FollowWaypointsGoal, FollowWaypointsResult, FollowWaypointsFeedback]
 Job = GoalJob[FollowWaypointsGoal, FollowWaypointsResult, FollowWaypointsFeedback]
@@ -197,7 +197,7 @@ class _TaskRun:
         if self._canceled_at is None:
             self._canceled_at = now
         grace_left = self._canceled_at + self._runtime.parameters.cancel_grace - now
-        return grace_left if grace_left > 1e-9 else self._abandon()
+        return grace_left if grace_left > TIME_RESOLUTION else self._abandon()
 
     def _declare_hung(self) -> None:
         """Give up at once: the task has stopped simulated time for too long, and its thread was detached."""

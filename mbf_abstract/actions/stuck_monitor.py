@@ -35,9 +35,9 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.avoided_places import AvoidedPlace, AvoidedPlaces
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, is_success, outcome_name
 from mbf_abstract.server.plugin_table import PluginTable
+from mbf_abstract.time.clock import TIME_RESOLUTION
 from mbf_abstract.traffic.right_of_way import MEETING_LENGTH
 
-TIME_RESOLUTION = 1e-9  # s
 MOST_MEETINGS = 5
 """How often the right of way is asked for at one place."""
 BLOCKED = frozenset(

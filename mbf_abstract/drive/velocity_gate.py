@@ -15,7 +15,7 @@ from mbf_abstract.drive.velocity_limits import VelocityLimits
 from mbf_abstract.event_bus import EventBus
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Command
-from mbf_abstract.time.clock import Clock, Priority, ThreadDetached
+from mbf_abstract.time.clock import TIME_RESOLUTION, Clock, Priority, ThreadDetached
 
 CLOSING_TRIES = 3
 """How often the watchdog of a closed gate still tries to stop a robot whose driver fails."""
@@ -243,7 +243,7 @@ class VelocityGate:
                 continue
             now = self._clock.now()
             remaining = max(self._writer.last_time, self._tried_at) + self._command_timeout - now
-            if remaining > 1e-9:
+            if remaining > TIME_RESOLUTION:
                 self._condition.wait(remaining)
                 continue
             self._closing_tries -= self._closed

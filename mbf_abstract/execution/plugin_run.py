@@ -26,7 +26,7 @@ from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import NonFiniteError
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.plugins import Plugin
-from mbf_abstract.time.clock import Stopwatch, ThreadDetached
+from mbf_abstract.time.clock import TIME_RESOLUTION, Stopwatch, ThreadDetached
 
 P = TypeVar("P", bound=Plugin)
 T = TypeVar("T")
@@ -253,7 +253,7 @@ class PluginRun(Generic[P]):
         if began is None:
             return IDLE_CHECK
         grace_left = self.runtime.parameters.cancel_grace + max(began, asked) - self.runtime.clock.now()
-        if grace_left > 1e-9:
+        if grace_left > TIME_RESOLUTION:
             return grace_left
         return self._abandon(began)
 

@@ -14,7 +14,7 @@ from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import with_changes
 from mbf_abstract.plugins import AbstractRecovery, RecoveryRequest, RecoveryResult
-from mbf_abstract.time.clock import Stopwatch
+from mbf_abstract.time.clock import TIME_RESOLUTION, Stopwatch
 
 
 class GatedMotion:
@@ -53,7 +53,7 @@ class GatedMotion:
         watch = Stopwatch(self._runtime.clock)
         token = self._run.handle.cancel_token
         with self._condition:
-            while watch.elapsed < seconds - 1e-9 and not token.cancelled:
+            while watch.elapsed < seconds - TIME_RESOLUTION and not token.cancelled:
                 paused = self._run.handle.paused
                 watch.pause() if paused else watch.resume()
                 self._condition.wait(None if paused else seconds - watch.elapsed)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from mbf_abstract.event_bus import EventBus
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
-from mbf_abstract.time.clock import Clock, Priority
+from mbf_abstract.time.clock import TIME_RESOLUTION, Clock, Priority
 
 Check = Callable[[], float | None]
 
@@ -117,7 +117,7 @@ class Supervisor:
         with self._condition:
             while self._watches or not self._closed:
                 now = self._clock.now()
-                due = [watch for watch in self._watches if watch.due <= now + 1e-9]
+                due = [watch for watch in self._watches if watch.due <= now + TIME_RESOLUTION]
                 if due:
                     return due
                 self._wake_at = min((watch.due for watch in self._watches), default=float("inf"))

@@ -12,9 +12,7 @@ from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.executives.nodes import Leaf
 from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, is_success
-from mbf_abstract.time.clock import Stopwatch
-
-TIME_RESOLUTION = 1e-9  # s
+from mbf_abstract.time.clock import TIME_RESOLUTION, Stopwatch
 
 BEYOND_RECOVERY = frozenset(
     [

@@ -12,10 +12,9 @@ from collections.abc import Generator
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from mbf_abstract.executives.conditions import TIME_RESOLUTION
 from mbf_abstract.executives.nodes import Composite, Decorator
 from mbf_abstract.geometry import Pose
-from mbf_abstract.time.clock import Stopwatch
+from mbf_abstract.time.clock import TIME_RESOLUTION, Stopwatch
 
 
 class Paced(Decorator):

@@ -20,11 +20,11 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from mbf_abstract.events import EventKind
-from mbf_abstract.executives.conditions import TIME_RESOLUTION
 from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.executives.tree_events import TreeReporter
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.navigator import Navigator
+from mbf_abstract.time.clock import TIME_RESOLUTION
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,8 @@ CHECKED_EVERY = 0.1  # m along a step
 TURN_COST = 0.2  # m that a turn on the spot by one heading counts
 GEAR_CHANGE_COST = 0.2  # m
 MOST_STATES = 20_000
+LEAST_LEFT = 0.01
+"""How far [m] it is, at least, from every pose at which a manoeuvre may not end."""
 
 PlanarPose = tuple[float, float, float]
 """x, y [m] and heading [rad] in a plane."""

@@ -16,6 +16,8 @@ from enum import IntEnum
 from types import TracebackType
 from typing import Protocol
 
+TIME_RESOLUTION = 1e-9
+"""Times [s] so near to each other are the same: sums of periods are rounded."""
 SIGNAL_PERIOD = 0.5
 """Longest wait [s] of the main thread before Python may handle a signal.
 

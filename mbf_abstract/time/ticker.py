@@ -7,7 +7,7 @@ from collections.abc import Callable
 from mbf_abstract.event_bus import EventBus
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
-from mbf_abstract.time.clock import Clock, Priority
+from mbf_abstract.time.clock import TIME_RESOLUTION, Clock, Priority
 
 
 class Ticker:
@@ -38,5 +38,5 @@ class Ticker:
                 self._events.emit(EventKind.FAULT, self._name, type=type(error).__name__, message=error_text(error))
             due = max(due + self._period, self._clock.now())
             with self._condition:
-                while not self._stopped and self._clock.now() < due - 1e-9:
+                while not self._stopped and self._clock.now() < due - TIME_RESOLUTION:
                     self._condition.wait(due - self._clock.now())

@@ -13,13 +13,11 @@ import numpy as np
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.maps.manoeuvres import PlanarPose
+from mbf_abstract.maps.manoeuvres import LEAST_LEFT, PlanarPose
 from mbf_mesh_nav.arrays import BoolArray, FloatArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE
 from mbf_mesh_nav.mesh.surface_point import nearest_corner
-
-LEAST_LEFT = 0.01  # m, from every pose that is not safe
 
 
 class LeavingSurface:

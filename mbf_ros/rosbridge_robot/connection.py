@@ -7,7 +7,7 @@ from functools import partial
 
 from mbf_abstract.access.outbox import MAX_ANSWERS, WaitingFrames
 from mbf_abstract.event_values import error_text
-from mbf_abstract.time.clock import Clock, ClockThread
+from mbf_abstract.time.clock import TIME_RESOLUTION, Clock, ClockThread
 from mbf_ros.rosbridge_robot.dialing import LinkError, Socket
 
 
@@ -215,7 +215,7 @@ class Connection:
         """Wait; returns whether the connection was closed meanwhile."""
         until = self._clock.now() + seconds
         with self._condition:
-            while not self._closed and (remaining := until - self._clock.now()) > 1e-9:
+            while not self._closed and (remaining := until - self._clock.now()) > TIME_RESOLUTION:
                 self._condition.wait(remaining)
             return self._closed
 

@@ -20,6 +20,7 @@ from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
 from mbf_abstract.server.map_server import MapServer
+from mbf_abstract.time.clock import TIME_RESOLUTION
 from terrain.learning.observation import Observation, ObservationParameters, Observer
 from terrain.physics.incidents import IncidentKind
 from terrain.recording.verdict import Verdict, judge
@@ -30,7 +31,6 @@ from terrain.session.robot_run import judged_numbers
 from terrain.session.session import Session, SessionOptions
 
 OWNER = "environment"  # of the lease of the velocity gate
-TIME_TOLERANCE = 1e-9  # s
 
 
 class Ending(Enum):
@@ -121,7 +121,7 @@ class Episode:
         here.
         """
         session = self.session
-        if self._replan_at <= session.clock.now() + TIME_TOLERANCE:  # as in a run: the next command is on the new plan
+        if self._replan_at <= session.clock.now() + TIME_RESOLUTION:  # as in a run: the next command is on the new plan
             self._plan_to_goal(is_new=False)
         self._lease.send(command)
         session.clock.sleep(self._control_period)

@@ -19,7 +19,7 @@ from mbf_abstract.geometry import Command, Pose, normalize_angle
 from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
 from mbf_abstract.session import NavigationSession
-from mbf_abstract.time.clock import Clock, WallClock
+from mbf_abstract.time.clock import TIME_RESOLUTION, Clock, WallClock
 from mbf_abstract.time.pace import Pace
 from terrain.session.arrival import arrival_tolerance
 from terrain.session.executives import GoalExecutive
@@ -30,7 +30,6 @@ OWNER = "cmd_vel"
 REPEAT_PERIOD = 0.1  # s of real time between two repetitions of the robot's state while the simulator waits
 TIME_AT_GOAL = 3.0  # s that it must stand at a goal; whoever drives learns of it, too, while time still passes
 STANDING = 0.05  # m/s, and rad/s; a robot on wheels that is slower stands
-TIME_TOLERANCE = 1e-9  # s
 
 
 class RobotLink(Protocol):
@@ -144,7 +143,7 @@ class OutsideDriver:
             self._pace.wait(time, 1.0)
             return
         self._pace.wait(time, 0.0)
-        if time - self._commanded < self._longest - TIME_TOLERANCE:
+        if time - self._commanded < self._longest - TIME_RESOLUTION:
             return
         while not self._link.wait(REPEAT_PERIOD) and self._has_patience():
             self._link.repeat()  # who hears nothing takes the robot for dead

@@ -6,9 +6,8 @@ from collections import deque
 from collections.abc import Callable
 
 from mbf_abstract.geometry import Command
+from mbf_abstract.time.clock import TIME_RESOLUTION
 from terrain.physics.protocols import SimulatedWorld
-
-TIME_TOLERANCE = 1e-9  # s; a step this close before the due time counts as reaching it
 
 
 class CommandDelay:
@@ -38,5 +37,5 @@ class CommandDelay:
             self._send(command)
 
     def _hand_over(self) -> None:
-        while self._waiting and self._waiting[0][0] <= self._world.time + TIME_TOLERANCE:
+        while self._waiting and self._waiting[0][0] <= self._world.time + TIME_RESOLUTION:
             self._send(self._waiting.popleft()[1])

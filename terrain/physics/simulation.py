@@ -18,13 +18,13 @@ from dataclasses import replace
 from typing import Any
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.time.clock import TIME_RESOLUTION
 from terrain.physics.encounters import NOBODY, Surroundings
 from terrain.physics.incidents import Incident, IncidentMonitor
 from terrain.physics.protocols import Actor, SimulatedRobot, SimulatedWorld
 from terrain.sensors.sensor import Sensor
 
 MONITOR_RATE = 20.0  # Hz
-TIME_TOLERANCE = 1e-9  # s; a target this close behind a step is reached by it
 
 Listener = Callable[[str, Any], None]
 
@@ -92,7 +92,7 @@ class Simulation:
 
     def advance_to(self, time: float) -> None:
         """Step until the world's time is at least ``time`` [s]; does nothing if it is already."""
-        while self.world.time < time - TIME_TOLERANCE:
+        while self.world.time < time - TIME_RESOLUTION:
             self.world.step()
 
     def _take_step(self) -> None:

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from mbf_abstract.events import Event, EventSink
 from mbf_abstract.server.announcer import Announcer
-from mbf_abstract.time.clock import Clock
+from mbf_abstract.time.clock import TIME_RESOLUTION, Clock
 from mbf_abstract.traffic.traffic import SharedChannel
 from terrain.scenarios.scenario import Scenario, load_scenario, robot_scenarios
 from terrain.scenarios.settings import apply_world_settings
@@ -25,7 +25,6 @@ from terrain.session.simulation_session import SENSE_FIRST
 from terrain.session.site import Site
 
 ANNOUNCING_PERIOD = 0.5  # s
-TIME_TOLERANCE = 1e-9  # s
 
 
 class Periodically:
@@ -38,7 +37,7 @@ class Periodically:
 
     def __call__(self, time: float) -> None:
         """Call if it is due."""
-        if time >= self._next - TIME_TOLERANCE:
+        if time >= self._next - TIME_RESOLUTION:
             self._next = time + self._period
             self._call()
 

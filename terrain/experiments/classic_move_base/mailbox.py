@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 
-from mbf_abstract.executives.conditions import TIME_RESOLUTION
 from mbf_abstract.goals.feedback_types import ExePathFeedback
 from mbf_abstract.goals.handle import AnyGoalHandle
-from mbf_abstract.time.clock import Clock
+from mbf_abstract.time.clock import TIME_RESOLUTION, Clock
 
 Message = tuple[AnyGoalHandle, ExePathFeedback | None]
 """A goal, and its feedback while it is not done."""

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from mbf_abstract.executives.conditions import TIME_RESOLUTION
 from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.goals.result_types import GetPathResult
+from mbf_abstract.time.clock import TIME_RESOLUTION
 
 PLANNER_SLOT = 0
 

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
-from mbf_abstract.executives.conditions import TIME_RESOLUTION
 from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.feedback_types import ExePathFeedback
@@ -30,6 +29,7 @@ from mbf_abstract.goals.result_types import ActionResult, MoveBaseResult
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import MoveBaseOutcome, is_success
 from mbf_abstract.plugins import PluginKind
+from mbf_abstract.time.clock import TIME_RESOLUTION
 from terrain.experiments.classic_move_base.mailbox import Mailbox
 from terrain.experiments.classic_move_base.planner import ClassicPlanner
 from terrain.experiments.classic_move_base.settings import (
