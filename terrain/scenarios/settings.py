@@ -50,11 +50,16 @@ def apply_settings(text: str, settings: Mapping[str, str]) -> str:
     Raises
     ------
     ConfigError
-        A dotted path leads through something that is no block of keys.
+        A dotted path leads through something that is no block of keys, or a key is one of the scenario.
     """
     if not settings:
         return text
     config: dict[str, Any] = yaml.safe_load(text)
+    findings = [
+        _of_the_scenario(key) for key in settings if _first(key) in Scenario.model_fields.keys() - config.keys()
+    ]
+    if findings:
+        raise ConfigError(findings)
     for key, value in settings.items():
         if key in PLUGIN_LISTS:
             config[PLUGIN_LISTS[key]] = _with_default(config.get(PLUGIN_LISTS[key]) or [], value)
@@ -62,6 +67,15 @@ def apply_settings(text: str, settings: Mapping[str, str]) -> str:
             file = Path(value)
             _set(config, key, str(file.absolute()) if file.suffix and file.is_file() else yaml.safe_load(value))
     return yaml.safe_dump(config, sort_keys=False)
+
+
+def _first(key: str) -> str:
+    return key.partition(".")[0]
+
+
+def _of_the_scenario(key: str) -> Finding:
+    expected = "planner, controller, world.KEY or a key of the configuration"
+    return Finding(f"setting {key}", 1, "", expected, f"{_first(key)}, a key of the scenario: change it in its file")
 
 
 def _with_default(plugins: list[dict[str, Any]], wanted: str) -> list[dict[str, Any]]:

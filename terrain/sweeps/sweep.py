@@ -111,7 +111,8 @@ def run_once(job: Job, keep_in: Path | None = None, command: str = "") -> dict[s
         try:
             result = run_scenario(scenario, options)
         except Exception as error:  # one impossible variant must not end the sweep
-            name, message = type(error).__name__, str(error)
+            # The folder has another name each time; the same runs give the same bytes.
+            name, message = type(error).__name__, str(error).replace(f"{folder}/", "")
             return {
                 "success": False,
                 "level": Level.FAILED.value,

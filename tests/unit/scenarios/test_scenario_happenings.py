@@ -171,6 +171,12 @@ def test_a_dotted_setting_through_a_value_is_refused():
         apply_settings(CONFIG, {"mesh_map.edge_cost_factor.x": "2"})
 
 
+@pytest.mark.parametrize("key", ["time_limit", "robot", "limits.max_tilt"])
+def test_a_setting_of_a_key_of_the_scenario_is_refused_as_one(key):
+    with pytest.raises(ConfigError, match=f"setting {key}:1: .* a key of the scenario: change it in its file"):
+        apply_settings(CONFIG, {key: "30"})
+
+
 def test_a_setting_of_the_world_changes_the_ground_and_is_no_setting_of_the_navigation():
     scenario, rest = apply_world_settings(load_scenario("outdoor"), {"world.size": "40.0", "planner": "cvp"})
     assert (scenario.world.size, rest) == (40.0, {"planner": "cvp"})

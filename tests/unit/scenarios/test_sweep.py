@@ -10,7 +10,7 @@ from terrain.scenarios.scenario import MapWorld, load_scenario
 from terrain.sweeps.command import parse_seeds, parse_settings
 from terrain.sweeps.log import SweepLog
 from terrain.sweeps.report import summarise, write_tables
-from terrain.sweeps.sweep import SweepRun, hash_of, is_done, plan_sweep
+from terrain.sweeps.sweep import SweepRun, hash_of, is_done, plan_sweep, run_once
 
 
 def row(seed, variant="planner=cvp", success=True, **more):
@@ -110,6 +110,15 @@ def test_a_run_that_is_done_again_is_kept_in_its_place(tmp_path):
         log.append("a", {"seed": 1, "folder": "runs/a"})
     with SweepLog(tmp_path / "runs.jsonl") as log:
         assert log.rows == {"a": {"key": "a", "seed": 1, "folder": "runs/a"}}
+
+
+def test_a_run_that_cannot_begin_says_why_without_a_folder_that_has_another_name_each_time():
+    job = load_scenario("crowded_corridor"), SweepRun(0, {"planer_patience": "3"})
+    first, again = run_once(job), run_once(job)
+    assert first == again and first["outcome"] == "ConfigError"
+    assert (
+        first["message"].startswith("navigation.yaml:") and "planer_patience: expected a known key" in first["message"]
+    )
 
 
 @pytest.mark.parametrize(
