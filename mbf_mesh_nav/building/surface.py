@@ -11,6 +11,7 @@ from mbf_abstract.geometry.arithmetic import tan
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.building.clouds.point_cloud import CLEARANCE
+from mbf_mesh_nav.building.decks import on_decks
 from mbf_mesh_nav.building.height_errors import height_errors
 from mbf_mesh_nav.building.heights import HeightLimits, fitted, noise_of_points, settled, smoothed, without_false_ground
 from mbf_mesh_nav.building.holes import without_holes
@@ -200,6 +201,9 @@ def _split(points: FloatArray, grid: Grid, chosen: SurfaceParameters, rise: floa
     offsets, ordered = sort_into_cells(points, by_height, grid.corner, grid.cell, grid.columns, grid.rows)
     thickest = chosen.slab_thickness + rise
     cells, firsts, ends, kinds = split_columns(ordered, offsets, chosen.clearance, thickest)
+    layers = cells, firsts, ends, kinds
+    firsts, is_left = on_decks(ordered, grid, layers, chosen.ground_thickness, chosen.slab_thickness, thickest)
+    cells, firsts, ends, kinds = cells[is_left], firsts[is_left], ends[is_left], kinds[is_left]
     bottoms, tops = ordered[firsts, 2], ordered[ends - 1, 2]
     unknown, standing = np.zeros(len(cells)), np.zeros(len(cells), dtype=np.int32)
     patches = SurfacePatches(grid, cells, kinds, firsts, ends, bottoms, tops, unknown, standing)
