@@ -31,10 +31,11 @@ def test_every_file_of_python_that_is_named_exists():
     assert [name for name in named if not any(file.endswith(f"/{name}") for file in known)] == []
 
 
-def test_every_decision_is_linked_from_the_concepts():
-    page = (DOCS / "concepts.md").read_text("utf-8")
+@pytest.mark.parametrize("page", ["docs/concepts.md", "mkdocs.yml"])
+def test_every_decision_is_listed_in_the_order_of_the_numbers(page):
+    listed = re.findall(r"^ *- .*decisions/(\d{4}-.*\.md)\)?$", (DOCS.parent / page).read_text("utf-8"), re.MULTILINE)
 
-    assert [file.name for file in sorted((DOCS / "decisions").glob("*.md")) if file.name not in page] == []
+    assert listed == [file.name for file in sorted((DOCS / "decisions").glob("*.md"))]
 
 
 @pytest.mark.parametrize(

@@ -181,3 +181,9 @@ def test_an_area_without_inside_is_refused(make):
 def test_a_polygon_of_flat_corners_says_what_a_corner_has():
     with pytest.raises(ValueError, match=r"a corner of a polygon has x, y and z \[m\], got \(1.0, 10.0\)"):
         PolygonArea(((1.0, 10.0), (3.0, 10.0), (3.0, 12.0)))
+
+
+def test_the_member_of_an_area_whose_arms_are_hardly_wide_lies_inside():
+    corners = [(10, 20), (12, 20), (12, 20.01), (10.01, 20.01), (10.01, 22), (10, 22)]
+    (member,) = PolygonArea(tuple((x, y, 0.0) for x, y in corners)).members()
+    assert PolygonArea(tuple((x, y, 0.0) for x, y in corners)).contains(member)

@@ -86,3 +86,11 @@ def test_a_buffer_without_a_clock_refuses_at_the_lookup():
 def test_static_transforms_have_no_future(buffer):
     buffer.set(Transform((1.0, 0.0, 0.0), parent="map", child="base", stamp=UNIX, static=True))
     assert buffer.lookup("map", "base", now=0.0, max_age=0.1).translation[0] == 1.0
+
+
+def test_of_a_chain_one_step_of_the_future_is_enough():
+    buffer = TransformBuffer()  # without a clock it takes such transforms, too
+    buffer.set(pose(1.0, child="odom"))
+    buffer.set(pose(2.0 + MAX_LEAD, parent="odom"))
+    with pytest.raises(StaleTransformError, match=r"stamped 3\.000 s in the future"):
+        buffer.lookup("map", "base", now=1.0, max_age=5.0)

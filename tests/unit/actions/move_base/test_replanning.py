@@ -4,7 +4,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Twist
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanResult
-from mbf_abstract.testing.faulty import obedient
+from mbf_abstract.testing.faulty import obedient, slow
 from mbf_abstract.testing.scripted import straight_plan
 
 
@@ -56,3 +56,15 @@ def test_a_replanning_under_way_at_the_goal_is_canceled(make_session):
     assert session.send(1.0).wait().success
     session.clock.sleep(0.1)
     assert not session.server.get_path.busy
+
+
+def test_the_time_to_the_next_plan_counts_from_when_the_robot_sets_off(make_session):
+    session = make_session(planner_frequency=1.0)
+    session.planner.play(slow(session.clock, 1.5, straight_plan), straight_plan)
+    handle = session.send(5.0)
+    session.clock.sleep(2.3)
+    assert session.plans == 1
+    session.clock.sleep(0.4)
+    assert session.plans == 2
+    handle.cancel()
+    handle.wait()
