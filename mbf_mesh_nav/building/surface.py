@@ -157,7 +157,9 @@ def build_surface(
     faces = faces_of_patches(patches.heights, links, ~is_obstacle)
     is_kept = _is_large(patches, faces, chosen.least_area)
     if not is_kept.any():
-        raise MeshError("point cloud", [f"there is no surface of {chosen.least_area:g} m² in it"])
+        flattest = "xyz"[int(np.argmin(np.ptp(points, axis=0)))]
+        hint = f"It is flattest along {flattest}: if that is up, choose --up {flattest}" if flattest != "z" else ""
+        raise MeshError("point cloud", [f"there is no surface of {chosen.least_area:g} m² in it"], hint)
     is_used, is_small = _of_faces(patches, faces[is_kept]), _of_faces(patches, faces[~is_kept])
     faces = faces[is_kept]
     on_step("error")

@@ -115,6 +115,13 @@ def test_a_dense_scan_does_not_make_the_cells_finer_than_a_robot_needs_and_its_m
     assert errors[0] < 0.8 * errors[1]
 
 
+def test_a_cloud_that_lies_on_its_side_is_told_which_axis_is_flattest(rng):
+    with pytest.raises(
+        MeshError, match=r"no surface of 10 m² in it\. It is flattest along y: if that is up, choose --up y"
+    ):
+        build_surface(ground(rng, flat)[:, [0, 2, 1]])
+
+
 def test_holes_are_filled_up_to_the_width_and_stay_where_they_are_wider(rng):
     points = ground(rng, hills)
     for x, y, radius in ((4.0, 6.0, 0.35), (11.0, 6.0, 1.5)):
