@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from mbf_abstract.config.bounded_files import read_arrays
+from terrain.worlds.esri_ascii import is_in_degrees, read_header, read_heights
 from terrain.worlds.generate import add_roughness
 from terrain.worlds.heightfield import MAX_SAMPLES, Heightfield
 
@@ -171,27 +172,24 @@ def _refuse_size(path: Path, rows: int, columns: int, max_samples: int) -> None:
 
 
 def _read_esri_ascii(path: Path, max_samples: int) -> Elevation:
-    header: dict[str, float] = {}
-    with path.open(encoding="ascii") as file:
-        for line in file:
-            fields = line.split()
-            if len(fields) != 2 or not re.match(r"[A-Za-z_]+$", fields[0]):
-                break
-            header[fields[0].lower()] = float(fields[1])
+    header = read_header(path)
     missing = [key for key in ("ncols", "nrows", "cellsize") if key not in header]
     if missing:
         raise TerrainFileError(path, f"expected {', '.join(missing)} in the header, got none")
     shape = int(header["nrows"]), int(header["ncols"])
     _refuse_size(path, *shape, max_samples)
     if path.stat().st_size > MAX_ASCII_BYTES_PER_SAMPLE * (shape[0] * shape[1] + len(header)):
-        raise TerrainFileError(
-            path, f"expected {shape[0]} x {shape[1]} heights, got {path.stat().st_size} bytes of text"
-        )
-    values = np.array(path.read_text(encoding="ascii").split()[2 * len(header) :], dtype=np.float64)
+        got = f"{path.stat().st_size} bytes of text"
+        raise TerrainFileError(path, f"expected {shape[0]} x {shape[1]} heights, got {got}")
+    values = read_heights(path, header)
     if values.size != shape[0] * shape[1]:
         raise TerrainFileError(path, f"expected {shape[0]} x {shape[1]} heights as in the header, got {values.size}")
-    void = header.get("nodata_value", ASCII_VOID)
-    return _northern_row_first(values.reshape(shape), header["cellsize"], header["cellsize"], void)
+    void, size = header.get("nodata_value", ASCII_VOID), header["cellsize"]
+    dx = dy = size
+    if is_in_degrees(header):
+        south = header.get("yllcorner", header.get("yllcenter", 0.0))
+        dx, dy = (size * length for length in degree_lengths(south + 0.5 * size * shape[0]))
+    return _northern_row_first(values.reshape(shape), dx, dy, void)
 
 
 def _read_hgt(path: Path, max_samples: int) -> Elevation:

@@ -87,7 +87,12 @@ def test_voids_are_filled_from_the_nearest_sample(tmp_path: Path) -> None:
     [
         ("a.asc", b"ncols 3\nnrows 2\n1 2 3 4 5 6\n", "cellsize"),
         ("a.asc", b"ncols 3\nnrows 2\ncellsize 1\n1 2 3\n", "expected 2 x 3 heights as in the header, got 3"),
-        ("a.asc", b"ncols 3\nnrows 2\ncellsize 1\n1 2 3 4 x 6\n", "cannot be read"),
+        (
+            "a.asc",
+            b"ncols 3\nnrows 2\ncellsize 1\n1 2 3\n4 x 6\n",
+            "line 5: expected heights with spaces between them, got 'x'",
+        ),
+        ("a.asc", b"ncols three\nnrows 2\ncellsize 1\n1 2 3\n", "line 1: ncols: expected a number, got 'three'"),
         ("a.asc", b"ncols 3000000\nnrows 2000000\ncellsize 1\n1\n", "the limit is"),
         ("a.asc", b"\xff\xfe\x00", "cannot be read"),
         ("N10E010.hgt", b"12345", "a square of 16-bit heights, got 5 bytes"),
@@ -144,6 +149,13 @@ def test_a_raster_larger_than_allowed_is_refused_in_every_format(tmp_path: Path,
     with pytest.raises(TerrainFileError, match="the limit is") as caught:
         read_elevation(file, 399 if ending != "npz" else 40)
     assert str(file) in str(caught.value)
+
+
+@pytest.mark.parametrize(("corner", "dx"), [("8.5\nyllcorner 60", 55.65), ("500000\nyllcorner 60", 0.001)])
+def test_cells_of_a_grid_in_degrees_get_their_length_in_metres(tmp_path: Path, corner: str, dx: float) -> None:
+    file = tmp_path / "degrees.asc"
+    file.write_text(f"ncols 2\nnrows 2\nxllcorner {corner}\ncellsize 0.001\n1 2\n3 4\n")
+    assert read_elevation(file).dx == pytest.approx(dx, rel=0.01)
 
 
 def test_a_grid_with_more_text_than_heights_is_refused_before_it_is_read(tmp_path: Path) -> None:
