@@ -31,6 +31,7 @@ def test_a_silent_sensor_makes_the_map_not_current_by_default(build):
     costmap.update(None, 0.0)
     assert "'laser' has not sent anything" in costmap.stale_reason(0.0)
     costmap.insert_points("laser", [(1.0, 1.0, 0.0)], (0.0, 0.0, 0.0), 0.0)
+    assert "nothing of observation source 'laser' is in the map" in costmap.stale_reason(0.0)
     costmap.update(None, 1.0)
     assert not costmap.stale_reason(1.0)
     costmap.update(None, 1.5)
