@@ -75,7 +75,7 @@ def test_an_absent_block_means_the_defaults():
         ("speed", {"a": 1}, "expected a number > 0 and <= 5 m/s, got a block of 1 keys"),
         ("count", -1, "expected a whole number >= 0, got -1"),
         ("count", 2.0, "expected a whole number >= 0, got 2.0"),
-        ("corner", [1, 2, 3], "should have at most 2 items"),
+        ("corner", [1, 2, 3], "expected a list of 2 items, got a list of 3 items"),
         ("corner", 3, "expected a list, got 3"),
         ("mode", "c", "expected 'a' or 'b', got 'c'"),
         ("side", "right", "expected 'left', got 'right'"),
