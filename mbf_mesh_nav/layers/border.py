@@ -33,5 +33,6 @@ class BorderLayer(MeshLayer):
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = ``border_cost`` at the border, lethal if that exceeds ``threshold``."""
-        costs = np.where(self.topology.border_vertices, self.parameters.border_cost, 0.0).astype(np.float32)
+        costs = np.zeros(self.topology.vertex_count, dtype=np.float32)
+        costs[self.topology.border_vertices] = self.parameters.border_cost
         return costs, costs > self.parameters.threshold
