@@ -12,12 +12,10 @@ from mbf_abstract.maps.controllers.tight_places import CLOSE_FROM, speed_before
 from mbf_abstract.plugins import ControlRequest
 from mbf_costmap_nav.control.rolling import braking_distance, rolled_poses
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
-from mbf_costmap_nav.grid.costmap import Costmap
-from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from unit.costmap_planning.long_robot import LONG_ROBOT, RESOLUTION, walled
 
-LONG_ROBOT = Footprint([[-0.43, -0.33], [0.43, -0.33], [0.43, 0.33], [-0.43, 0.33]])
-RESOLUTION, PERIOD = 0.05, 0.05
+PERIOD = 0.05
 SLUGGISH = {
     "max_vel_x": 0.6,
     "acc_lim_x": 0.5,
@@ -27,15 +25,6 @@ SLUGGISH = {
 }
 CHANGE = 0.5 * PERIOD + 1e-9
 UPWARD = Pose.planar(0.0, -3.0, 0.5 * math.pi)
-
-
-def walled(*boxes):
-    """A map of 10 m x 10 m about the origin with lethal boxes (x from, to, y from, to) [m]."""
-    cells = np.zeros((200, 200), dtype=np.uint8)
-    for x0, x1, y0, y1 in boxes:
-        columns, rows = (slice(*(round((end + 5.0) / RESOLUTION) for end in ends)) for ends in ((x0, x1), (y0, y1)))
-        cells[rows, columns] = 254
-    return Costmap(cells, RESOLUTION, -5.0, -5.0)
 
 
 def drive(controller, costmap, pose, path, seconds=60.0):

@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist
@@ -10,22 +9,10 @@ from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
-from mbf_costmap_nav.grid.costmap import Costmap
-from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from unit.costmap_planning.long_robot import LONG_ROBOT, RESOLUTION, walled
 
-LONG_ROBOT = Footprint([[-0.43, -0.33], [0.43, -0.33], [0.43, 0.33], [-0.43, 0.33]])
-RESOLUTION = 0.05
 PERIOD = 0.05
-
-
-def walled(*boxes):
-    """A map of 10 m x 10 m about the origin with lethal boxes (x from, to, y from, to) [m]."""
-    cells = np.zeros((200, 200), dtype=np.uint8)
-    for x0, x1, y0, y1 in boxes:
-        columns, rows = (slice(*(round((end + 5.0) / RESOLUTION) for end in ends)) for ends in ((x0, x1), (y0, y1)))
-        cells[rows, columns] = 254
-    return Costmap(cells, RESOLUTION, -5.0, -5.0)
 
 
 def drive(controller, costmap, pose, path, seconds=40.0):
