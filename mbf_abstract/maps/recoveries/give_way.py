@@ -10,8 +10,9 @@ nothing the map knows: back into a bay, around a corner, or a step aside in a ha
 tracked near its path is taken to go beside it, and that path is kept free, too, where there is such a place. The
 manoeuvre is driven slowly, each command checked as in every recovery, and searched anew where one is refused (see
 ``pulling_out``); afterwards it stands for a time that is drawn anew for each run, or until those who were tracked on
-its path, since it set out, have left it. Where it could not turn to its path there, it drives the manoeuvre back. Where
-there is no such place it ends with IMPASSABLE at once.
+its path, since it set out, have left it. Where who stood ahead drives on, it had waited for somebody else, and the
+robot stops where it can turn to its path (see ``left_path``). Where it could not turn to its path in the place, it
+drives the manoeuvre back. Where there is no such place it ends with IMPASSABLE at once.
 
 Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
 goes first waits until the others have left its path; the others pull out, also off the path that the first one has
@@ -146,7 +147,6 @@ class GiveWayRecovery(PullingOutRecovery):
             result = self._wait_for(request, before, f"has pulled out at ({place.x:.2f}, {place.y:.2f}) for")
         else:
             result = self._stand_until_clear(request, left, p.wait + p.random_extra * float(self.rng.random()))
-            result = replace(result, message=f"{result.message} at ({place.x:.2f}, {place.y:.2f}), beside its path")
         if not result.success or self.turns_to(begin, request.motion.pose()):
             return result
         back = self.drive_back(request, partial(self.turns_to, begin))
@@ -155,13 +155,17 @@ class GiveWayRecovery(PullingOutRecovery):
 
     def _stand_until_clear(self, request: RecoveryRequest, left: LeftPath, duration: float) -> RecoveryResult:
         """Stand for a time [s]; less, where somebody was seen on the path that it left, and is gone or drives on."""
-        place, begun, result = self.on_map(request.motion.pose()), self.clock.now(), RecoveryResult(0)
+        pose = request.motion.pose()
+        place, begun, result, why = self.on_map(pose), self.clock.now(), RecoveryResult(0), "beside its path"
         while result.success and (still := begun + duration - (now := self.clock.now())) > 0.0:
             present = left.look(place, now)
-            if (left.seen and not present) or left.is_free_again(place, now):
+            if left.is_free_again(place, now):
+                why = "until who stood ahead drove on"
+                break
+            if left.seen and not present:
                 break
             result = stand(request, min(still, WAIT_PERIOD))
-        waited = f"waited {self.clock.now() - begun:.3g} s"
+        waited = f"waited {self.clock.now() - begun:.3g} s at ({pose.x:.2f}, {pose.y:.2f}), {why}"
         return replace(result, message=waited) if result.success else result
 
     # --------------------------------------------------------------------------------------------- the other robots
