@@ -31,9 +31,8 @@ from terrain.scenarios.scenario import Scenario, load_scenario
 from terrain.scenarios.world_types import MapWorld
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.sweeps.command import parse_seeds
-from terrain.sweeps.log import SweepLog
+from terrain.sweeps.log import rows_of
 from terrain.sweeps.sweep import hash_of
-from terrain.sweeps.worker_pool import run_in_workers
 
 RESOLUTION, WIDTH, HEIGHT = 0.05, 16.0, 10.0  # m
 PILLARS = ((4.5, 3.0), (4.5, 7.0), (10.5, 3.5), (11.0, 7.0))
@@ -92,12 +91,7 @@ def run_jobs(jobs: list[Job], executive: str, workers: int, results: Path, floor
     """Yield the row of every run: first those that the file holds, then the others as they finish."""
     head = f"{source_digest()}/{hash_of(scenario_in(floor))}/{executive}"
     keys = {job: "/".join([head, *map(str, job)]) for job in jobs}
-    with SweepLog(results) as log:
-        yield from (log.rows[key] for key in keys.values() if key in log.rows)
-        missing = [job for job, key in keys.items() if key not in log.rows]
-        for job, row in run_in_workers(partial(run_job, floor=floor, executive=executive), missing, workers):
-            log.append(keys[job], row)
-            yield row
+    yield from (row for _, row in rows_of(keys, results, partial(run_job, floor=floor, executive=executive), workers))
 
 
 def summarise(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -28,9 +28,8 @@ from terrain.scenarios.perturbation import Perturbation
 from terrain.scenarios.scenario import Scenario, load_scenario
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.sweeps.command import parse_seeds
-from terrain.sweeps.log import SweepLog
+from terrain.sweeps.log import rows_of
 from terrain.sweeps.sweep import hash_of
-from terrain.sweeps.worker_pool import run_in_workers
 
 PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain")
 PERTURBED = Perturbation(
@@ -70,12 +69,7 @@ def run_jobs(jobs: Iterable[Job], workers: int, results: Path) -> Iterator[dict[
     source = source_digest()
     hashes = {(name, variant): hash_of(scenario_of(name, variant)) for name, variant, _ in jobs}
     keys = {job: f"{source}/{hashes[job[:2]]}/{job[2]}" for job in jobs}
-    with SweepLog(results) as log:
-        yield from (log.rows[key] for key in keys.values() if key in log.rows)
-        missing = [job for job, key in keys.items() if key not in log.rows]
-        for job, row in run_in_workers(run_job, missing, workers):
-            log.append(keys[job], row)
-            yield row
+    yield from (row for _, row in rows_of(keys, results, run_job, workers))
 
 
 def source_digest() -> str:

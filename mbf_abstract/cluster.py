@@ -20,7 +20,9 @@ class ClusterError(Exception):
     """The cluster cannot be used; the text names the remedy."""
 
 
-def run_on_cluster(do: Callable[[J], R], jobs: Sequence[J], address: str) -> Iterator[tuple[J, R]]:
+def run_on_cluster(
+    do: Callable[[J], R], jobs: Sequence[J], address: str, wanted: Callable[[J], bool] = lambda job: True
+) -> Iterator[tuple[J, R]]:
     """Do all jobs on the workers of a scheduler and yield each with its result as it finishes.
 
     Parameters
@@ -31,6 +33,8 @@ def run_on_cluster(do: Callable[[J], R], jobs: Sequence[J], address: str) -> Ite
         Each can be pickled.
     address : str
         Of the scheduler, such as ``tcp://10.0.0.1:8786``.
+    wanted : callable
+        Whether a job is to be done, asked again with each result; jobs that are no longer wanted are cancelled.
 
     Raises
     ------
@@ -49,9 +53,12 @@ def run_on_cluster(do: Callable[[J], R], jobs: Sequence[J], address: str) -> Ite
         raise ClusterError(f"no scheduler answers at {address}: {error}") from error
     with client:
         _refuse_threads(client)
-        running = {client.submit(do, job, pure=False): job for job in jobs}
+        running = {client.submit(do, job, pure=False): job for job in filter(wanted, jobs)}
         for finished in as_completed(running, loop=client.loop):
-            yield running.pop(finished), finished.result()
+            job = running.pop(finished)
+            if finished.status != "cancelled":
+                yield job, finished.result()
+                client.cancel([future for future, other in running.items() if not wanted(other)])
 
 
 def _refuse_threads(client: Any) -> None:

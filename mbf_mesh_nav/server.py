@@ -19,6 +19,7 @@ from mbf_abstract.config.configuration import Config
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Path as PlannedPath
+from mbf_abstract.geometry.survey import Survey
 from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.maps.view import FieldView, MeshView
@@ -198,6 +199,11 @@ class MeshNavigationServer(MapServer):
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
         """Heights of all surfaces at a place, the lowest free one first; see ``ground.ground_heights``."""
         return ground_heights(self.mesh_map, x, y)
+
+    @property
+    def survey(self) -> Survey | None:
+        """That of the mesh's file."""
+        return self.mesh_map.survey
 
     map_view_type = MeshView
 

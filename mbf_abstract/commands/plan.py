@@ -17,6 +17,7 @@ from mbf_abstract.commands.waiting import waiting
 
 if TYPE_CHECKING:
     from mbf_abstract.geometry import Pose
+    from mbf_abstract.geometry.survey import Survey
     from mbf_abstract.goals.result_types import GetPathResult
     from mbf_abstract.server.navigation_server import AbstractNavigationServer
 
@@ -42,6 +43,9 @@ def plan(
     planner: str = typer.Option("", "--planner", help="Name of the planner; the first one if not given."),
     tolerance: float = typer.Option(0.0, "--tolerance", min=0.0, help="How far from the goal the path may end [m]."),
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object, with all poses."),
+    survey: bool = typer.Option(
+        False, "--survey", help="Start, goal and poses are in coordinates of the survey of the map; degrees: LON LAT."
+    ),
     unknown: Unknown | None = typer.Option(
         None, "--unknown", help="Whether unknown cells of a bare map are free (the default, with a note) or lethal."
     ),
@@ -64,8 +68,9 @@ def plan(
             with waiting("building the map and its layers"):
                 server = open_server.enter_context(standing_server(cls, checked))
             notes += server.notes
-            start_pose = _pose("start", from_place, server, notes)
-            goal_pose = _pose("goal", to_place, server, notes)
+            surveyed = _survey_of(server, config) if survey else None
+            start_pose = _pose("start", from_place, server, notes, surveyed)
+            goal_pose = _pose("goal", to_place, server, notes, surveyed)
             place_robot(server, start_pose)
             began = wall_seconds()
             with waiting("planning") as say, record_compilations(lambda name: say(f"compiling {name}")) as compiled:
@@ -78,17 +83,33 @@ def plan(
                     draw_plan(png, server, start_pose, goal_pose, result)
     if compiled.kernels:
         typer.echo(str(compiled), err=True)
-    _report(result, seconds, notes, as_json)
+    _report(result, seconds, notes, as_json, surveyed)
     if not result.success:
         raise typer.Exit(FAILURE)
 
 
-def _pose(name: str, place: Place, server: AbstractNavigationServer, notes: list[str]) -> Pose:
+def _survey_of(server: AbstractNavigationServer, config: Path) -> Survey:
+    """The survey of the map; ConfigError where there is none."""
+    from mbf_abstract.config.findings import ConfigError, Finding
+
+    if server.survey is None:
+        expected = "a map whose file states its survey (GeoTIFF, ESRI ASCII, SRTM, a map of mbf map build)"
+        raise ConfigError([Finding(str(config), 1, "", expected, "--survey with another one")])
+    return server.survey
+
+
+def _pose(
+    name: str, place: Place, server: AbstractNavigationServer, notes: list[str], survey: Survey | None = None
+) -> Pose:
     """Pose at a place; a note names which storey was taken where there are several, or that there is no ground."""
     from mbf_abstract.geometry import Pose
 
     if server.ground_is_level:
         place = place.on_flat_map()
+    if survey is not None:
+        z = None if place.z is None else place.z - survey.origin[2]
+        place = Place(*survey.to_map(place.x, place.y), z, place.yaw)
+        notes.append(f"the {name} is at ({place.x:.2f}, {place.y:.2f}) of the map")
     yaw = place.yaw or 0.0
     if abs(yaw) > 2.0 * math.pi:
         notes.append(f"the heading at the {name} is {yaw:g} rad, more than a turn: degrees are not meant")
@@ -96,14 +117,17 @@ def _pose(name: str, place: Place, server: AbstractNavigationServer, notes: list
         return Pose.planar(place.x, place.y, yaw, place.z, frame_id=server.config.parameters.global_frame)
     heights = server.ground_heights(place.x, place.y)
     if not heights:
-        notes.append(f"there is no ground at the {name} ({place.x:g}, {place.y:g}); its z is taken as 0 m")
+        hint = "" if survey or server.survey is None else "; --survey takes coordinates of the survey"
+        notes.append(f"there is no ground at the {name} ({place.x:g}, {place.y:g}); its z is taken as 0 m{hint}")
     if len(heights) > 1:
         others = ", ".join(f"{height:.2f}" for height in heights[1:])
         notes.append(f"the {name} is put on the ground at z = {heights[0]:.2f} m; there is more at {others} m: give Z")
     return server.ground_pose(place.x, place.y, yaw)
 
 
-def _report(result: GetPathResult, seconds: float, notes: list[str], as_json: bool) -> None:
+def _report(
+    result: GetPathResult, seconds: float, notes: list[str], as_json: bool, survey: Survey | None = None
+) -> None:
     """Print the result on stdout; what was found in the map on stderr, or as one more entry of the JSON object."""
     path = result.path
     facts: dict[str, Any] = {
@@ -116,7 +140,7 @@ def _report(result: GetPathResult, seconds: float, notes: list[str], as_json: bo
         "time_s": round(seconds, 6),
     }
     if as_json:
-        poses = [] if path is None else [[*pose.position, *pose.orientation] for pose in path]
+        poses = [] if path is None else [[*_position(pose, survey), *pose.orientation] for pose in path]
         typer.echo(json.dumps({**facts, "notes": notes, "poses": poses}))
         return
     for note in notes:
@@ -124,3 +148,8 @@ def _report(result: GetPathResult, seconds: float, notes: list[str], as_json: bo
     facts["poses"] = 0 if path is None else len(path)
     for key, value in facts.items():
         typer.echo(f"{key:13} {'-' if value is None else value}")
+
+
+def _position(pose: Pose, survey: Survey | None) -> tuple[float, ...]:
+    """Position [m] on the map, or in the coordinates of its survey."""
+    return pose.position if survey is None else (*survey.from_map(pose.x, pose.y), pose.z + survey.origin[2])

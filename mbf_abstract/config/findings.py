@@ -5,7 +5,8 @@ Loaders collect findings and raise one ``ConfigError`` at the end, so a user see
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -77,6 +78,21 @@ def describe_value(value: object) -> str:
         return f"a list of {len(value)} items"
     text = repr(value)
     return text if len(text) <= _GOT_WIDTH else text[: _GOT_WIDTH - 3] + "..."
+
+
+@contextmanager
+def refused_at(file: str, *key: str | int, expected: str, of: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+    """Turn a ValueError of the block, and what else is named, into a ConfigError with one finding about a key.
+
+    A text such as "expected X, got Y" says itself what was expected; else the whole text is what came.
+    """
+    refusals: tuple[type[Exception], ...] = (ValueError, *of)
+    try:
+        yield
+    except refusals as error:
+        wanted, parted, got = text_of(error).partition(", got ")
+        wanted, got = (wanted.removeprefix("expected "), got) if parted else (expected, wanted)
+        raise ConfigError([Finding(file, 1, format_key_path(key), wanted, got)]) from error
 
 
 def suggest(word: str, known: Iterable[str]) -> str:

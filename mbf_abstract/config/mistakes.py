@@ -125,6 +125,8 @@ def _expected(model: type[BaseModel], error: ErrorDetails, loc: KeyPath) -> str:
         return f"a value {limits}".strip()
     if error["type"] == "too_long" and error["ctx"]["field_type"] == "Tuple":
         return f"a list of {error['ctx']['max_length']} items"
+    if error["type"] == "too_short" and error["ctx"]["field_type"] == "Tuple":
+        return f"a list of at least {error['ctx']['min_length']} items"
     text = _EXPECTED.get(error["type"]) or error["msg"].removeprefix("Value error, ")
     return text.removeprefix("Input should be ").removeprefix("expected ")
 

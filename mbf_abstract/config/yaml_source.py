@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +59,12 @@ class YamlDocument:
     def finding(self, path: KeyPath, expected: str, got: str, hint: str = "") -> Finding:
         """Make a finding about the value at ``path``."""
         return Finding(str(self.path), self.line(path), format_key_path(path), expected, got, hint)
+
+    def located(self, finding: Finding) -> Finding:
+        """Return a finding about one of its keys with this file, and the line of the key or of the one around it."""
+        around = {format_key_path(path): line for path, line in self.lines.items()}
+        known = (key for key in around if re.match(re.escape(key) + r"(?![^.\[])", finding.key))
+        return replace(finding, file=str(self.path), line=around.get(max(known, key=len, default=""), 1))
 
 
 def load_yaml(path: str | os.PathLike[str]) -> YamlDocument:

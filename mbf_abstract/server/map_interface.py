@@ -15,6 +15,7 @@ from typing import ClassVar
 
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.survey import Survey
 from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.sensing import RangeScan
@@ -93,6 +94,11 @@ class MapInterface(PluginHost):
         ConfigError
             The file is damaged, or too large.
         """
+        return None
+
+    @property
+    def survey(self) -> Survey | None:
+        """Where the map lies in the coordinates of its survey; None if its file does not state it."""
         return None
 
     ground_is_level: ClassVar[bool] = False

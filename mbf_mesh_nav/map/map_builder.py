@@ -40,12 +40,13 @@ from mbf_abstract.maps.layers.layer_list import (
 )
 from mbf_mesh_nav.files.map_header import read_map_header
 from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.files.surveys import survey_of
 from mbf_mesh_nav.files.vertex_errors import errors_on_mesh, read_vertex_errors
 from mbf_mesh_nav.map.height_error import with_height_error
 from mbf_mesh_nav.map.layer import LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_cache import LayerCache
 from mbf_mesh_nav.map.layer_graph import LayerGraph
-from mbf_mesh_nav.map.map_findings import frame_findings, header_findings, lying_findings, map_findings
+from mbf_mesh_nav.map.map_findings import frame_findings, lying_findings, map_findings, survey_findings
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.densify import densify
@@ -94,6 +95,7 @@ def build_mesh_map(
     if parameters.densify > 0.0:
         mesh = densify(mesh, parameters.densify, file=file or "arrays")
     mesh_map = MeshMap(build_topology(mesh), frame_id, report, parameters.inscribed_radius)
+    mesh_map.survey = survey_of(file)
     mesh_map.footprint, mesh_map.max_turning_slope = parameters.footprint, parameters.max_turning_slope
     if plan:
         if (errors := read_vertex_errors(Path(file)) if file else None) is not None:
@@ -106,7 +108,7 @@ def build_mesh_map(
         default = parameters.default_layer or last_with_costs(plan, parameters.layers)
         mesh_map.set_layers(graph, default, parameters.edge_cost_factor)
     report.findings += frame_findings(file, parameters.up_axis, parameters.unit)
-    report.findings += [*header_findings(file), *map_findings(mesh_map)]
+    report.findings += [*survey_findings(mesh_map, file), *map_findings(mesh_map)]
     report.findings += lying_findings(mesh_map, file, parameters.up_axis)
     return mesh_map
 

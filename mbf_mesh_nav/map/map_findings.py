@@ -36,18 +36,17 @@ def frame_findings(file: str, up_axis: str, unit: float) -> Iterator[Finding]:
         yield Finding("file_frame", text, NOWHERE, harmless=True)
 
 
-def header_findings(file: str) -> Iterator[Finding]:
-    """One finding for a map of ``mbf map build``: its origin and its error; ``file`` is "" for arrays."""
-    header = read_map_header(Path(file)) if file else None
-    if header is not None:
-        x, y, z = header.origin
-        text = (
-            f"(0, 0, 0) of the map lies at ({x:.10g}, {y:.10g}, {z:.10g}) of its survey "
-            f"({header.crs or 'coordinate system unknown'}), "
-            f"whose points are {header.error_rms:.3f} m (rms) from the surface; standard error of its heights "
+def survey_findings(mesh_map: MeshMap, file: str) -> Iterator[Finding]:
+    """One finding where the file states its survey: origin, and of a map of ``mbf map build`` its error."""
+    if mesh_map.survey is None:
+        return
+    text = f"(0, 0, 0) of the map lies at {mesh_map.survey}"
+    if (header := read_map_header(Path(file))) is not None:
+        text += (
+            f", whose points are {header.error_rms:.3f} m (rms) from the surface; standard error of its heights "
             f"{header.height_error:.3f} m"
         )
-        yield Finding("origin", text, NOWHERE, harmless=True)
+    yield Finding("origin", text, NOWHERE, harmless=True)
 
 
 def map_findings(mesh_map: MeshMap) -> Iterator[Finding]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.survey import Survey
 from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
@@ -43,11 +44,14 @@ class MeshMap(SnapshotAnswers):
         Standard errors of the heights of the vertices [m]; None if the map's file does not state them one by one.
     place_errors : (V,) float64, optional
         Those of places on the faces around the vertices [m].
+    survey : Survey, optional
+        Where it lies in the coordinates of its survey; None if its file does not state it.
     """
 
     layers: LayerGraph
     height_errors: FloatArray | None = None
     place_errors: FloatArray | None = None
+    survey: Survey | None = None
 
     def __init__(
         self,

@@ -93,8 +93,8 @@ class BulletWorld(SimulatedWorld):
             More than 2**21 samples, which Bullet would cut off silently.
         """
         if terrain.heights.size > MAX_HEIGHTFIELD_SAMPLES:
-            text = f"at most {MAX_HEIGHTFIELD_SAMPLES} samples, this one has {terrain.ny} x {terrain.nx}"
-            raise ValueError(f"a Bullet heightfield holds {text}; crop or resample it, or use add_mesh")
+            text = f"at most {MAX_HEIGHTFIELD_SAMPLES} samples for Bullet (crop it, or set a larger spacing)"
+            raise ValueError(f"expected {text}, got {terrain.ny} x {terrain.nx}")
         shift = float(terrain.heights.max())
         raw = terrain.heights - np.float32(shift)
         shape = self.bullet.createCollisionShape(

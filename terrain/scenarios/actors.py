@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy import ndimage
 
+from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.parameters import ParameterModel, parameter
@@ -19,10 +20,13 @@ from terrain.physics.actors import PERSON, PERSON_HEIGHT, PERSON_RADIUS, Body, R
 from terrain.physics.people import Person
 from terrain.physics.robot_models import ROBOTS
 from terrain.scenarios.obstacles import Size
-from terrain.scenarios.places import PlanarPose
+from terrain.scenarios.perturbation import DrawnError
+from terrain.scenarios.places import Interval, PlanarPose, off_the_ground
 from terrain.scenarios.world import ScenarioWorld
 from terrain.worlds.occupancy import OccupancyGrid
 from terrain.worlds.wall_clearance import Walls
+
+Route = Annotated[tuple[tuple[float, float], ...], Field(min_length=1)]
 
 MAX_ROUTE_DRAWS = 10_000
 LONGEST_LEG = 12.0  # m; short legs of a drawn route are found sooner
@@ -32,7 +36,7 @@ class Walker(ParameterModel):
     """A person who walks a closed route without end."""
 
     type: Literal["walker"]
-    route: tuple[tuple[float, float], ...] = parameter(..., "Corners; the last leg leads back to the first.", unit="m")
+    route: Route = parameter(..., "Corners; the last leg leads back to the first.", unit="m")
     speed: float = parameter(0.8, "Walking speed.", unit="m/s", ge=0.0, le=5.0)
     start: float = parameter(0.0, "How far along the route it starts.", unit="m", ge=0.0)
     radius: float = parameter(PERSON_RADIUS, "Of the upright cylinder it is.", unit="m", gt=0.0, le=10_000.0)
@@ -47,7 +51,7 @@ class OtherRobot(ParameterModel):
 
     type: Literal["robot"]
     model: Literal["husky", "turtlebot", "car"] = parameter("turtlebot", "Its size and looks.")
-    route: tuple[tuple[float, float], ...] = parameter(..., "Corners; the last leg leads back to the first.", unit="m")
+    route: Route = parameter(..., "Corners; the last leg leads back to the first.", unit="m")
     speed: float = parameter(0.5, "Speed.", unit="m/s", ge=0.0, le=5.0)
     start: float = parameter(0.0, "How far along the route it starts.", unit="m", ge=0.0)
     blind: bool = parameter(False, "Push the robot that is in its way, instead of waiting while it is just ahead.")
@@ -59,8 +63,8 @@ class Crowd(ParameterModel):
     type: Literal["crowd"]
     count: int = parameter(4, "Number of people.", ge=0, le=200)
     speed: float = parameter(0.6, "Walking speed.", unit="m/s", ge=0.0, le=5.0)
-    x_range: tuple[float, float] | None = parameter(None, "Part of the building where they walk.", unit="m")
-    y_range: tuple[float, float] | None = parameter(None, "Part of the building where they walk.", unit="m")
+    x_range: Interval | None = parameter(None, "Part of the building where they walk.", unit="m")
+    y_range: Interval | None = parameter(None, "Part of the building where they walk.", unit="m")
     blind: bool = parameter(
         False, "Follow the route at constant speed and push what is in the way, instead of yielding as people do."
     )
@@ -83,17 +87,34 @@ Actor = Annotated[Walker | OtherRobot | Crowd | Door, Field(discriminator="type"
 def add_actors(
     world: ScenarioWorld, actors: Sequence[Walker | OtherRobot | Crowd | Door], rng: np.random.Generator
 ) -> None:
-    """Put the actors of a scenario into its world and its list; routes of crowds come from ``rng``."""
+    """Put the actors of a scenario into its world and its list; routes of crowds come from ``rng``.
+
+    Raises ConfigError where an actor is off the ground or has no map to walk on, DrawnError for a route that was not
+    found.
+    """
     walls = None if world.grid is None else Walls(world.grid)
-    for actor in actors:
+    for number, actor in enumerate(actors):
+        key = f"actors[{number}]"
         if isinstance(actor, Crowd):
-            world.actors.extend(_crowd(world, actor, walls, rng))
+            world.actors.extend(_crowd(world, actor, walls, rng, key))
         elif isinstance(actor, Door):
-            opened, closed = (_leaf_pose(world, place, actor.size[2]) for place in (actor.opened, actor.closed))
+            ends = {"opened": actor.opened, "closed": actor.closed}
+            opened, closed = (
+                Pose.planar(end.x, end.y, end.yaw, _ground(world, end.x, end.y, f"{key}.{name}") + 0.5 * actor.size[2])
+                for name, end in ends.items()
+            )
             world.actors.append(SlidingDoor(world.physics, opened, closed, actor.size, actor.closes_at, actor.duration))
         else:
-            route = np.array([(x, y, world.height_at(x, y)) for x, y in actor.route])
+            corners = enumerate(actor.route)
+            route = np.array([(x, y, _ground(world, x, y, f"{key}.route[{corner}]")) for corner, (x, y) in corners])
             world.actors.append(_on_route(world, actor, route, walls))
+
+
+def _ground(world: ScenarioWorld, x: float, y: float, key: str) -> float:
+    height = world.height_at(x, y)
+    if not math.isfinite(height):
+        raise off_the_ground(key, x, y)
+    return height
 
 
 def _on_route(
@@ -119,14 +140,17 @@ def _person(
 
 
 def _crowd(
-    world: ScenarioWorld, crowd: Crowd, walls: Walls | None, rng: np.random.Generator
+    world: ScenarioWorld, crowd: Crowd, walls: Walls | None, rng: np.random.Generator, key: str
 ) -> list[RouteWalker | Person]:
     if world.grid is None:
-        raise ValueError("a crowd needs a world with a 2D map to draw its routes on")
+        expected = "no crowd in a world without a 2D map to draw its routes on"
+        raise ConfigError([Finding("scenario", 1, key, expected, f"{crowd.count} people")])
     grid = _part_of(world.grid, crowd)
-    return [
-        _person(world, random_route(grid, rng), crowd, float(rng.uniform(0.0, 20.0)), walls) for _ in range(crowd.count)
-    ]
+    try:
+        routes = [(random_route(grid, rng), float(rng.uniform(0.0, 20.0))) for _ in range(crowd.count)]
+    except ValueError as error:
+        raise DrawnError([Finding("scenario", 1, key, "room to walk between the walls", str(error))]) from error
+    return [_person(world, route, crowd, start, walls) for route, start in routes]
 
 
 def _part_of(grid: OccupancyGrid, crowd: Crowd) -> OccupancyGrid:
@@ -138,10 +162,6 @@ def _part_of(grid: OccupancyGrid, crowd: Crowd) -> OccupancyGrid:
     y_min, y_max = crowd.y_range or (-np.inf, np.inf)
     inside = ((y >= y_min) & (y <= y_max))[:, None] & ((x >= x_min) & (x <= x_max))[None, :]
     return OccupancyGrid(grid.occupied, grid.free & inside, grid.resolution, grid.origin_x, grid.origin_y)
-
-
-def _leaf_pose(world: ScenarioWorld, place: PlanarPose, height: float) -> Pose:
-    return Pose.planar(place.x, place.y, place.yaw, world.height_at(place.x, place.y) + 0.5 * height)
 
 
 def random_route(grid: OccupancyGrid, rng: np.random.Generator, corners: int = 4, clearance: float = 0.4) -> FloatArray:
@@ -170,7 +190,7 @@ def random_route(grid: OccupancyGrid, rng: np.random.Generator, corners: int = 4
         if len(route) == corners:
             centres = (np.array(route, dtype=float)[:, ::-1] + 0.5) * grid.resolution
             return np.asarray(centres + np.array([grid.origin_x, grid.origin_y]))
-    raise ValueError(f"found no route of {corners} corners with {clearance} m to the walls")
+    raise ValueError(f"no route of {corners} corners with {clearance} m to the walls")
 
 
 def _leg_is_open(open_cells: NDArray[np.bool_], a: NDArray[np.intp], b: NDArray[np.intp], longest: float) -> bool:

@@ -34,7 +34,7 @@ def build_environment(scenario: Scenario, folder: Path, seed: int) -> tuple[Scen
     world = build_world(scenario.world, files, rng, keep_clear, 1.0 / scenario.physics_rate, is_kinematic)
     try:
         rng = np.random.default_rng([seed, FOREST_STREAM])
-        posts = [post for forest in scenario.forests for post in forest.posts(rng, keep_clear)]
+        posts = [post for forest in scenario.forests for post in forest.posts(rng, keep_clear, world.height_at)]
         obstacles = add_obstacles(world.physics, [*scenario.obstacles, *posts], world.height_at)
         add_actors(world, scenario.actors, np.random.default_rng([seed, ACTOR_STREAM]))
     except BaseException:

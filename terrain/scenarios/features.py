@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.worlds.generate import add_boulders, add_crater, add_ridge, add_road, add_ruts, add_steps
 from terrain.worlds.heightfield import Heightfield
 
-PlanarLine = tuple[tuple[float, float], ...]
+PlanarLine = Annotated[tuple[tuple[float, float], ...], Field(min_length=2)]
 
 
 class Ridge(ParameterModel):
@@ -49,7 +49,9 @@ class Road(ParameterModel):
     """A road that is level across; hairpins make a switchback."""
 
     type: Literal["road"]
-    points: tuple[tuple[float, float, float], ...] = parameter(..., "Corners of its middle with heights.", unit="m")
+    points: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=2)] = parameter(
+        ..., "Corners of its middle with heights.", unit="m"
+    )
     width: float = parameter(3.0, "Of the level part.", unit="m", gt=0.0, le=10_000.0)
     shoulder: float = parameter(1.0, "Over which it fades into the ground on each side.", unit="m", gt=0.0, le=10_000.0)
 
@@ -61,6 +63,13 @@ class Boulders(ParameterModel):
     density: float = parameter(5.0, "Boulders on 100 square metres.", ge=0.0, le=200.0)
     radius_min: float = parameter(0.1, "Smallest radius.", unit="m", gt=0.0, le=10_000.0)
     radius_max: float = parameter(0.8, "Largest radius.", unit="m", gt=0.0, le=10_000.0)
+
+    @model_validator(mode="after")
+    def _check_radii(self) -> Boulders:
+        if self.radius_min > self.radius_max:
+            got = f"{self.radius_min:g} and {self.radius_max:g}"
+            raise ValueError(f"expected a radius_min of at most radius_max, got {got}")
+        return self
 
 
 class Steps(ParameterModel):

@@ -12,11 +12,12 @@ from pydantic import Field
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.physics.actors import AnyWorld
-from terrain.scenarios.places import FULL_TURN
+from terrain.scenarios.places import FULL_TURN, Interval, off_the_ground
 from terrain.worlds.surface import Surface, box, cylinder, joined
 
 DRAWS_PER_POST = 100
 
+HeightAt = Callable[[float, float], float]
 Length = Annotated[float, Field(gt=0.0, le=10_000.0)]
 Size = tuple[Length, Length, Length]
 
@@ -34,35 +35,41 @@ class Obstacle(ParameterModel):
 class Forest(ParameterModel):
     """Posts at places drawn from the seed, each with room around it to drive through."""
 
-    x_range: tuple[float, float] = parameter(..., "Where it begins and ends along x.", unit="m")
-    y_range: tuple[float, float] = parameter(..., "Where it begins and ends along y.", unit="m")
+    x_range: Interval = parameter(..., "Where it begins and ends along x.", unit="m")
+    y_range: Interval = parameter(..., "Where it begins and ends along y.", unit="m")
     count: int = parameter(30, "Number of posts; fewer if there is no room.", ge=0, le=10_000)
     gap: float = parameter(2.0, "Least distance between the middles of two posts.", unit="m", gt=0.0, le=10_000.0)
     diameter: float = parameter(0.3, "Of a post.", unit="m", gt=0.0, le=10_000.0)
     height: float = parameter(1.5, "Of a post.", unit="m", gt=0.0, le=10_000.0)
 
-    def posts(self, rng: np.random.Generator, keep_clear: FloatArray) -> list[Obstacle]:
-        """Draw the posts, none nearer than the gap to the places ``keep_clear`` (n, 2) [m] or to another post."""
+    def posts(
+        self, rng: np.random.Generator, keep_clear: FloatArray, height_at: HeightAt = lambda x, y: 0.0
+    ) -> list[Obstacle]:
+        """Draw the posts, none nearer than the gap to the places ``keep_clear`` (n, 2) [m] or to another post.
+
+        Where ``height_at`` is not finite there is no ground to stand on.
+        """
         taken = [tuple(place) for place in keep_clear.tolist()]
         posts: list[Obstacle] = []
         for _ in range(DRAWS_PER_POST * self.count):
             x, y = float(rng.uniform(*self.x_range)), float(rng.uniform(*self.y_range))
             if len(posts) == self.count:
                 break
-            if all(math.hypot(x - a, y - b) >= self.gap for a, b in taken):
+            if all(math.hypot(x - a, y - b) >= self.gap for a, b in taken) and math.isfinite(height_at(x, y)):
                 taken.append((x, y))
                 posts.append(Obstacle(shape="cylinder", x=x, y=y, size=(self.diameter, self.diameter, self.height)))
         return posts
 
 
-def add_obstacles(
-    world: AnyWorld, obstacles: Iterable[Obstacle], height_at: Callable[[float, float], float]
-) -> Surface | None:
-    """Put the obstacles on the ground and return them as one surface, for pictures."""
+def add_obstacles(world: AnyWorld, obstacles: Iterable[Obstacle], height_at: HeightAt) -> Surface | None:
+    """Put the obstacles on the ground and return them as one surface, for pictures; ConfigError where there is none."""
     parts = []
-    for obstacle in obstacles:
+    for number, obstacle in enumerate(obstacles):
         length, _, height = obstacle.size
-        pose = Pose.planar(obstacle.x, obstacle.y, obstacle.yaw, height_at(obstacle.x, obstacle.y) + 0.5 * height)
+        ground = height_at(obstacle.x, obstacle.y)
+        if not math.isfinite(ground):
+            raise off_the_ground(f"obstacles[{number}]", obstacle.x, obstacle.y)
+        pose = Pose.planar(obstacle.x, obstacle.y, obstacle.yaw, ground + 0.5 * height)
         if obstacle.shape == "box":
             world.add_box(pose, obstacle.size)
             surface = box(obstacle.size)

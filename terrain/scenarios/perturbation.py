@@ -12,11 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.scenarios.places import Place, PlanarPose
 
 PERTURBATION_STREAM = 5  # of the run's seed; 1 to 4 belong to the world
+
+
+class DrawnError(ConfigError):
+    """What was drawn from a seed cannot be used; what is drawn from another one may be."""
 
 
 class Perturbation(ParameterModel):
@@ -55,12 +60,19 @@ class Disturbance:
     mass: float = 1.0
 
     def moved(self, place: Place, pose_of: Callable[[Place], Pose]) -> Pose:
-        """Return the pose of a start after shift and turn; coordinates without a height stay on the ground."""
+        """Return the pose of a start after shift and turn; coordinates without a height stay on the ground.
+
+        Raises DrawnError where the shift leads off the ground, ConfigError where the start itself is off it.
+        """
         if isinstance(place, str):
             named = pose_of(place)
             place = PlanarPose(x=named.x, y=named.y, yaw=named.yaw, z=named.z)
         moved = {"x": place.x + self.dx, "y": place.y + self.dy, "yaw": place.yaw + self.dyaw}
-        return pose_of(place.model_copy(update=moved))
+        pose_of(place)
+        try:
+            return pose_of(place.model_copy(update=moved))
+        except ConfigError as error:
+            raise DrawnError(error.findings) from error
 
 
 def draw_disturbance(perturb: Perturbation, seed: int) -> Disturbance:

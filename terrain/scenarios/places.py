@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Annotated
 
 import numpy as np
+from pydantic import AfterValidator
 
+from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.parameters import ParameterModel, parameter
 
@@ -25,6 +28,20 @@ class PlanarPose(ParameterModel):
 Place = PlanarPose | str
 
 
+def _in_order(interval: tuple[float, float]) -> tuple[float, float]:
+    if interval[0] > interval[1]:
+        raise ValueError(f"expected two numbers, the smaller first, got {interval[0]:g}, {interval[1]:g}")
+    return interval
+
+
+Interval = Annotated[tuple[float, float], AfterValidator(_in_order)]
+
+
 def coordinates(places: Iterable[Place | None]) -> FloatArray:
     """Return (n, 2) x and y [m] of the places that are given by coordinates."""
     return np.array([(place.x, place.y) for place in places if isinstance(place, PlanarPose)]).reshape(-1, 2)
+
+
+def off_the_ground(key: str, x: float, y: float) -> ConfigError:
+    """Return the error about a ``key`` of the scenario that has no ground at (x, y) [m]."""
+    return ConfigError([Finding("scenario", 1, key, "a place on the ground of the world", f"({x:g}, {y:g})")])

@@ -13,14 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.findings import ConfigError, Finding, refused_at
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.physics.actors import AnyWorld, RouteWalker
 from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.people import Person
 from terrain.physics.protocols import Actor, SimulatedRobot
 from terrain.physics.world import TIME_STEP, BulletWorld
-from terrain.scenarios.places import Place
+from terrain.scenarios.places import Place, off_the_ground
 from terrain.scenarios.world_types import BuildingWorld, LevelsWorld, TerrainWorld
 from terrain.worlds.geodesics import free_floor
 from terrain.worlds.heightfield import Heightfield
@@ -93,8 +93,7 @@ class ScenarioWorld:
             return self.places[place]
         z = self.height_at(place.x, place.y) if place.z is None else place.z
         if not math.isfinite(z) or (self.grid is not None and not self.grid.covers(place.x, place.y)):
-            expected, got = "a place on the ground of the world", f"({place.x:g}, {place.y:g})"
-            raise ConfigError([Finding("scenario", 1, "start or goals", expected, got)])
+            raise off_the_ground("start or goals", place.x, place.y)
         return Pose.planar(place.x, place.y, place.yaw, z)
 
 
@@ -148,7 +147,8 @@ def _closed_if_that_fails(physics: AnyWorld) -> Iterator[None]:
 
 def _build_terrain(terrain: Heightfield, lethal_slope: float, files: MapFiles, physics: AnyWorld) -> ScenarioWorld:
     if isinstance(physics, BulletWorld):
-        physics.add_heightfield(terrain)
+        with refused_at("scenario", "world", expected="ground that the physics can hold"):
+            physics.add_heightfield(terrain)
     ground, resolution = terrain.surface(), min(terrain.dx, terrain.dy)
     written = files.of_terrain(terrain, lethal_slope)
     grid = slope_grid(terrain, resolution, lethal_slope)

@@ -14,15 +14,15 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.findings import ConfigError, Finding, refused_at
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.scenarios.features import Feature, put_on
-from terrain.worlds.elevation_files import jacksboro, read_dem
+from terrain.worlds.elevation_files import TerrainFileError, jacksboro, read_dem
 from terrain.worlds.floor_plan import OFFICE_MAP, read_floor_plan
 from terrain.worlds.generate import flat_terrain, fractal_terrain
 from terrain.worlds.heightfield import Heightfield
-from terrain.worlds.mesh_world import read_mesh_world
+from terrain.worlds.mesh_world import MeshFileError, read_mesh_world
 from terrain.worlds.multi_level import MultiLevelWorld, bridge_over_road, parking_garage
 from terrain.worlds.occupancy import OccupancyGrid, read_occupancy
 from terrain.worlds.slope_map import LETHAL_SLOPE
@@ -54,7 +54,8 @@ class JacksboroWorld(TerrainWorld):
 
     def heightfield(self, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
         """Read the survey that comes with matplotlib."""
-        return jacksboro(self.size, self.spacing, self.roughness, rng)
+        with refused_at("scenario", "world", "spacing", expected="a distance of samples that the size allows"):
+            return jacksboro(self.size, self.spacing, self.roughness, rng)
 
 
 class GeneratedWorld(TerrainWorld):
@@ -69,10 +70,11 @@ class GeneratedWorld(TerrainWorld):
 
     def heightfield(self, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
         """Draw the ground."""
-        if self.median_slope > 0.0:
-            terrain = fractal_terrain(*self.size, self.spacing, rng, self.median_slope, self.roughness)
-        else:
-            terrain = flat_terrain(*self.size, self.spacing)
+        with refused_at("scenario", "world", "size", expected="a size that its hills fit into"):
+            if self.median_slope > 0.0:
+                terrain = fractal_terrain(*self.size, self.spacing, rng, self.median_slope, self.roughness)
+            else:
+                terrain = flat_terrain(*self.size, self.spacing)
         for feature in self.features:
             terrain = put_on(terrain, feature, rng, keep_clear)
         return terrain
@@ -91,12 +93,15 @@ class HeightfieldWorld(TerrainWorld):
 
     def heightfield(self, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
         """Read the file."""
-        terrain = read_dem(self.file)
+        with refused_at("scenario", "world", "file", expected="an elevation model", of=(TerrainFileError,)):
+            terrain = read_dem(self.file)
         if self.crop is not None:
-            terrain = terrain.crop(*self.crop)
+            with refused_at("scenario", "world", "crop", expected="a part of the file"):
+                terrain = terrain.crop(*self.crop)
         if self.size is not None:
             terrain = terrain.scaled(self.size / terrain.size[0])
-        return terrain if self.spacing is None else terrain.resample(self.spacing)
+        with refused_at("scenario", "world", "spacing", expected="a distance of samples that the size allows"):
+            return terrain if self.spacing is None else terrain.resample(self.spacing)
 
 
 class BuildingWorld(ParameterModel):
@@ -189,7 +194,8 @@ class MeshWorld(LevelsWorld):
 
     def levels(self) -> MultiLevelWorld:
         """Read the file."""
-        return MultiLevelWorld(read_mesh_world(self.file, self.up_axis, self.unit), NO_SURFACE, {})
+        with refused_at("scenario", "world", "file", expected="a mesh to drive on", of=(MeshFileError,)):
+            return MultiLevelWorld(read_mesh_world(self.file, self.up_axis, self.unit), NO_SURFACE, {})
 
 
 World = Annotated[

@@ -197,10 +197,15 @@ class _Collecting:
 
     def _findings_of(self, error: Exception) -> Iterable[Finding]:
         if isinstance(error, ConfigError):
-            return [replace(wrong, file=self.renamed.get(wrong.file, wrong.file)) for wrong in error.findings]
+            return [self._with_its_file(wrong) for wrong in error.findings]
         got = f"{type(error).__name__}: {text_of(error)}"
         for name, other in self.renamed.items():
             got = got.replace(name, other)
         if isinstance(self._where, YamlDocument):
             return [self._where.finding(self._key, "a world that can be built", got)]
         return [Finding(str(self._where), 1, "", "a map and plugins that can be built", got)]
+
+    def _with_its_file(self, wrong: Finding) -> Finding:
+        if isinstance(self._where, YamlDocument) and wrong.file == "scenario":  # as what builds a world calls it
+            return self._where.located(wrong)
+        return replace(wrong, file=self.renamed.get(wrong.file, wrong.file))

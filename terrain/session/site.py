@@ -17,7 +17,7 @@ from terrain.physics.motion_sample import Thing
 from terrain.physics.robot_models import Drive
 from terrain.physics.robots import WheeledRobot
 from terrain.scenarios.environment import build_environment
-from terrain.scenarios.perturbation import draw_disturbance
+from terrain.scenarios.perturbation import DrawnError, draw_disturbance
 from terrain.scenarios.scenario import Scenario, robot_scenarios
 from terrain.scenarios.sensors import AnyRobot, ray_casters
 from terrain.session.simulation_session import SessionOptions
@@ -121,4 +121,5 @@ def _refuse_overlaps(scenario: Scenario, robots: Mapping[str, AnyRobot]) -> None
                 key, at = f"robots[{number}].start", f"({pose.x:.2f}, {pose.y:.2f})"
                 findings.append(Finding(scenario.name, 1, key, f"a place that {other!r} does not stand in", at))
     if findings:
-        raise ConfigError(findings)
+        drawn = any(robot.perturb.start_position for robot in robot_scenarios(scenario).values())
+        raise (DrawnError if drawn else ConfigError)(findings)

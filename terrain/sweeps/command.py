@@ -58,7 +58,7 @@ def sweep(
         from terrain.scenarios.scenario import load_scenario
         from terrain.sweeps.log import SweepLog
         from terrain.sweeps.report import write_tables
-        from terrain.sweeps.sweep import hash_of, is_done, plan_sweep, run_once
+        from terrain.sweeps.sweep import hash_of, is_done, plan_sweep, run_once, run_unless_refused
         from terrain.sweeps.worker_pool import run_in_workers
 
         loaded = load_scenario(scenario)
@@ -72,9 +72,11 @@ def sweep(
             jobs = [(loaded, run) for run in left]
             do = partial(run_once, keep_in=out.resolve() if keep else None, command=command_line(context))
             if scheduler is None:
-                finished = run_in_workers(do, jobs, workers)
+                spread = partial(run_in_workers, do, workers=workers)
             else:
-                finished = run_on_cluster(do, jobs, scheduler)
+                spread = partial(run_on_cluster, do, address=scheduler)
+            known = [log.rows[run.key(hashed)] for run in planned if run.key(hashed) in log.rows]
+            finished = run_unless_refused(jobs, known, spread)
             for (_, run), metrics in track(
                 finished, escape(well_formed(loaded.name)), len(left), console=console, disable=not console.is_terminal
             ):

@@ -8,10 +8,14 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from mbf_abstract.config.findings import ConfigError, Finding, describe_value
+from terrain.sweeps.worker_pool import run_in_workers
+
+J = TypeVar("J")
 
 
 class SweepLog:
@@ -67,7 +71,7 @@ class SweepLog:
         """Add a finished run and wait until it is on the disk; a key that is there already changes nothing."""
         if key in self.rows:
             return
-        self.rows[key] = {"key": key, **row}
+        self.rows[key] = {**row, "key": key}
         self._file.write(json.dumps(self.rows[key], sort_keys=True).encode() + b"\n")
         self._file.flush()
         os.fsync(self._file.fileno())
@@ -85,3 +89,24 @@ class SweepLog:
 
     def __exit__(self, *exc: object) -> None:
         self.close()
+
+
+def rows_of(
+    keys: Mapping[J, str], file: Path, do: Callable[[J], dict[str, Any]], workers: int, **more: Any
+) -> Iterator[tuple[J, dict[str, Any]]]:
+    """Yield each job with its row: first those that a file holds, then the others as workers finish them.
+
+    Parameters
+    ----------
+    keys : mapping
+        Key of each job in the file, see ``SweepLog``.
+    do : callable
+        Makes a row; of a module, so that a worker can import it.
+    **more
+        What every new row holds beside what it was made of.
+    """
+    with SweepLog(file) as log:
+        yield from ((job, log.rows[key]) for job, key in keys.items() if key in log.rows)
+        for job, row in run_in_workers(do, [job for job, key in keys.items() if key not in log.rows], workers):
+            log.append(keys[job], row := {**row, **more})
+            yield job, row

@@ -10,14 +10,16 @@ import hashlib
 import itertools
 import re
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from mbf_abstract.config.findings import ConfigError
 from terrain.provenance.named_files import hash_with_named_files, named_files
 from terrain.recording.recording import Recording
 from terrain.recording.verdict import Level
+from terrain.scenarios.perturbation import DrawnError
 from terrain.scenarios.scenario import Scenario
 
 
@@ -47,6 +49,7 @@ class SweepRun:
 
 
 Job = tuple[Scenario, SweepRun]
+Row = Mapping[str, Any]
 
 MAX_NAME = 60  # characters of a variant in the name of its folder
 MAX_TRACK = 200  # points of a track in the log, for figures
@@ -76,6 +79,27 @@ def is_done(row: Mapping[str, Any] | None, keep: bool) -> bool:
     A run that could not begin has no track and no folder, and would not begin now.
     """
     return row is not None and not (keep and "track" in row and "folder" not in row)
+
+
+def run_unless_refused(
+    jobs: Sequence[Job], known: Sequence[Row], spread: Callable[..., Iterator[tuple[Job, Row]]]
+) -> Iterator[tuple[Job, Row]]:
+    """Yield each job with its row as it finishes; the first refusal of settings stands for all their other runs.
+
+    Parameters
+    ----------
+    known : sequence of dict
+        Rows of runs that were done before.
+    spread : callable
+        Does the jobs it is given as far as they are ``wanted``, see ``run_in_workers``.
+    """
+    refused, left = {row["variant"]: row for row in known if row.get("refused")}, list(jobs)
+    for job, row in spread(jobs=jobs, wanted=lambda job: job[1].variant not in refused):
+        left.remove(job)
+        if row.get("refused"):
+            refused.setdefault(job[1].variant, row)
+        yield job, row
+    yield from ((job, refused[job[1].variant]) for job in left)
 
 
 def run_once(job: Job, keep_in: Path | None = None, command: str = "") -> dict[str, Any]:
@@ -111,17 +135,24 @@ def run_once(job: Job, keep_in: Path | None = None, command: str = "") -> dict[s
         try:
             result = run_scenario(scenario, options)
         except Exception as error:  # one impossible variant must not end the sweep
-            # The folder has another name each time; the same runs give the same bytes.
-            name, message = type(error).__name__, str(error).replace(f"{folder}/", "")
-            return {
-                "success": False,
-                "level": Level.FAILED.value,
-                "verdict": f"{name}: {message}",
-                "outcome": name,
-                "message": message,
-                "spl": 0.0,
-            }
+            return _not_begun(error, folder)
     return {**result.metrics, "track": tracks[0], **({} if keep_in is None else {"folder": run.folder})}
+
+
+def _not_begun(error: Exception, folder: Path) -> dict[str, Any]:
+    """The row of a run that could not begin; ``refused`` if no other one with its settings can, whatever its seed."""
+    # The folder has another name each time; the same runs give the same bytes.
+    name, message = type(error).__name__, str(error).replace(f"{folder}/", "")
+    refused = isinstance(error, ConfigError) and not isinstance(error, DrawnError)
+    return {
+        "success": False,
+        "level": Level.FAILED.value,
+        "verdict": f"refused with every seed: {message}" if refused else f"{name}: {message}",
+        "outcome": name,
+        "message": message,
+        "refused": refused,
+        "spl": 0.0,
+    }
 
 
 def thinned_track(recording: Recording) -> list[list[float]]:

@@ -26,7 +26,9 @@ PARENT_CHECK = 1.0  # s between two looks of a worker whether the process that f
 MAX_POOLS = 5  # pools that are started anew after a worker died, before it is given up
 
 
-def run_in_workers(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Iterator[tuple[J, R]]:
+def run_in_workers(
+    do: Callable[[J], R], jobs: Sequence[J], workers: int, wanted: Callable[[J], bool] = lambda job: True
+) -> Iterator[tuple[J, R]]:
     """Do all jobs in ``workers`` processes and yield each with its result as it finishes.
 
     Parameters
@@ -35,6 +37,8 @@ def run_in_workers(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Ite
         Of a module, so that a worker can import it. It runs on the worker's main thread.
     jobs : sequence
         Each can be pickled.
+    wanted : callable
+        Whether a job is to be done, asked when its turn comes, so that results may decide it.
 
     Raises
     ------
@@ -44,7 +48,7 @@ def run_in_workers(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Ite
     left = list(jobs)
     for attempt in range(MAX_POOLS):
         try:
-            for job, result in _run_in_pool(do, tuple(left), workers):
+            for job, result in _run_in_pool(do, filter(wanted, tuple(left)), workers):
                 left.remove(job)
                 yield job, result
             return
@@ -53,9 +57,9 @@ def run_in_workers(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Ite
                 raise
 
 
-def _run_in_pool(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Iterator[tuple[J, R]]:
+def _run_in_pool(do: Callable[[J], R], waiting: Iterator[J], workers: int) -> Iterator[tuple[J, R]]:
     """Keep a pool busy; no more jobs are handed out than it can work on, so that a stop is quick."""
-    waiting, running = iter(jobs), dict[Future[R], J]()
+    running = dict[Future[R], J]()
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin_worker, (os.getpid(), workers))
     try:
         for job in itertools.islice(waiting, workers):

@@ -9,7 +9,6 @@ a map, ``read_elevation`` leaves them: the mesh server takes it by the entry poi
 from __future__ import annotations
 
 import math
-import re
 import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,19 +18,25 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from mbf_abstract.config.bounded_files import read_arrays
-from terrain.worlds.esri_ascii import is_in_degrees, read_header, read_heights
+from mbf_abstract.geometry.survey import Survey
+from terrain.worlds.elevation_surveys import (
+    PIXEL_SCALE,
+    degree_lengths,
+    survey_of_grid,
+    survey_of_tags,
+    survey_of_tile,
+)
+from terrain.worlds.esri_ascii import read_header, read_heights
 from terrain.worlds.generate import add_roughness
 from terrain.worlds.heightfield import MAX_SAMPLES, Heightfield
 
-METRES_PER_DEGREE = 111_320.0  # along a meridian, and along the equator; good to half a percent everywhere
 MAX_VOID_SHARE = 0.5
 
 ASCII_VOID = -9999.0
 """What an ESRI ASCII grid without a NODATA_value has for voids, by the format's definition."""
 MAX_ASCII_BYTES_PER_SAMPLE = 64
 HGT_VOID = -32768
-TIFF_PIXEL_SCALE, TIFF_TIE_POINT, TIFF_NO_DATA, TIFF_GEO_KEYS = 33550, 33922, 42113, 34735
-GEO_KEY_MODEL_TYPE, MODEL_TYPE_GEOGRAPHIC = 1024, 2
+TIFF_NO_DATA = 42113
 
 
 class TerrainFileError(Exception):
@@ -53,11 +58,6 @@ class Elevation(NamedTuple):
     heights: NDArray[np.float64]
     dx: float
     dy: float
-
-
-def degree_lengths(latitude: float) -> tuple[float, float]:
-    """Length [m] of one degree of longitude and of latitude at ``latitude`` [degrees]."""
-    return METRES_PER_DEGREE * math.cos(math.radians(latitude)), METRES_PER_DEGREE
 
 
 def jacksboro(
@@ -185,17 +185,18 @@ def _read_esri_ascii(path: Path, max_samples: int) -> Elevation:
     if values.size != shape[0] * shape[1]:
         raise TerrainFileError(path, f"expected {shape[0]} x {shape[1]} heights as in the header, got {values.size}")
     void, size = header.get("nodata_value", ASCII_VOID), header["cellsize"]
-    dx = dy = size
-    if is_in_degrees(header):
-        south = header.get("yllcorner", header.get("yllcenter", 0.0))
-        dx, dy = (size * length for length in degree_lengths(south + 0.5 * size * shape[0]))
+    dx, dy = (size * length for length in _units(survey_of_grid(header)))
     return _northern_row_first(values.reshape(shape), dx, dy, void)
+
+
+def _units(survey: Survey | None) -> tuple[float, float]:
+    return (1.0, 1.0) if survey is None else survey.units
 
 
 def _read_hgt(path: Path, max_samples: int) -> Elevation:
     """SRTM: one degree square of big-endian int16; the name holds the south-west corner, e.g. ``N44W072``."""
-    name = re.match(r"([NS])(\d{2})[EW]\d{3}", path.stem, re.IGNORECASE)
-    if name is None:
+    survey = survey_of_tile(path.stem)
+    if survey is None:
         raise TerrainFileError(
             path, f"expected a name that starts with the corner of the SRTM tile, such as N44W072, got {path.stem!r}"
         )
@@ -205,8 +206,7 @@ def _read_hgt(path: Path, max_samples: int) -> Elevation:
         raise TerrainFileError(path, f"expected a square of 16-bit heights, got {size} bytes")
     _refuse_size(path, side, side, max_samples)
     values = np.fromfile(path, dtype=">i2")
-    latitude = (1.0 if name[1].upper() == "N" else -1.0) * float(name[2]) + 0.5
-    dx, dy = (length / (side - 1) for length in degree_lengths(latitude))
+    dx, dy = (length / (side - 1) for length in survey.units)
     return _northern_row_first(values.reshape(side, side), dx, dy, HGT_VOID)
 
 
@@ -224,14 +224,10 @@ def _read_geotiff(path: Path, max_samples: int) -> Elevation:
             raise TerrainFileError(path, f"cannot be read: {error}") from error
     if raster.ndim != 2:
         raise TerrainFileError(path, f"expected one band of heights, got {raster.shape[-1]}")
-    if TIFF_PIXEL_SCALE not in tags:
+    if PIXEL_SCALE not in tags:
         raise TerrainFileError(path, "expected a GeoTIFF with a pixel scale (tag 33550), got none")
-    dx, dy = float(tags[TIFF_PIXEL_SCALE][0]), float(tags[TIFF_PIXEL_SCALE][1])
-    keys = tags.get(TIFF_GEO_KEYS, ())
-    model_types = [keys[i + 3] for i in range(4, len(keys) - 3, 4) if keys[i] == GEO_KEY_MODEL_TYPE]
-    if MODEL_TYPE_GEOGRAPHIC in model_types:
-        latitude = float(tags[TIFF_TIE_POINT][4]) - 0.5 * dy * raster.shape[0]
-        dx, dy = (degrees * length for degrees, length in zip((dx, dy), degree_lengths(latitude), strict=True))
+    units = _units(survey_of_tags(tags, len(raster)))
+    dx, dy = (float(size) * length for size, length in zip(tags[PIXEL_SCALE][:2], units, strict=True))
     no_data = tags.get(TIFF_NO_DATA)
     return _northern_row_first(raster, dx, dy, None if no_data is None else float(str(no_data).strip("\0 ")))
 

@@ -6,6 +6,7 @@ What is wrong is named with its line, as such files are often written by hand or
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +54,7 @@ def _refuse_words(number: int, words: list[str]) -> None:
             raise ValueError(f"line {number}: expected {expected}, got {word[:SHOWN]!r}") from None
 
 
-def is_in_degrees(header: dict[str, float]) -> bool:
+def is_in_degrees(header: Mapping[str, float]) -> bool:
     """Whether the cells of a grid are given in degrees, as those of surveys of whole countries are."""
     x = header.get("xllcorner", header.get("xllcenter", np.inf))
     y = header.get("yllcorner", header.get("yllcenter", np.inf))

@@ -21,8 +21,7 @@ from terrain.experiments.table1.environments import warehouse_environment as war
 from terrain.experiments.table1.environments.outdoor_environment import OUTDOOR
 from terrain.experiments.table1.environments.world import load_world
 from terrain.experiments.table1.repetition import run_repetition
-from terrain.sweeps.log import SweepLog
-from terrain.sweeps.worker_pool import run_in_workers
+from terrain.sweeps.log import rows_of
 
 LOG = "runs.jsonl"
 
@@ -94,19 +93,11 @@ class Campaign:
 
     def rows(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, dict[str, Any]]]:
         """Yield every job with its row: first those that are known, then the others as they finish."""
-        with SweepLog(self._file) as log:
-            known = {job: log.rows.get(self._key(job)) for job in jobs}
-            yield from ((job, row) for job, row in known.items() if row is not None)
-            for job, row in run_in_workers(do, [job for job, row in known.items() if row is None], self.workers):
-                log.append(self._key(job), row)
-                yield job, row
+        return rows_of({job: f"{self.parameters_hash}/{job.name}" for job in jobs}, self._file, do, self.workers)
 
     def job(self, condition: str, seed: int, empty: bool = False, again: bool = False) -> Job:
         """Make a job in this campaign's world."""
         return Job(condition, seed, self.world, empty, again)
-
-    def _key(self, job: Job) -> str:
-        return f"{self.parameters_hash}/{job.name}"
 
 
 def tally_of(row: Mapping[str, Any]) -> Tally:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from terrain.sweeps import log
+
 SOURCE = Path(__file__).resolve().parents[3] / "benchmarks" / "margins.py"
 SPEC = spec_from_file_location("margins", SOURCE)
 margins = sys.modules["margins"] = module_from_spec(SPEC)
@@ -47,7 +49,7 @@ def run_once(monkeypatch):
             done.append(job)
             yield job, row(*job)
 
-    monkeypatch.setattr(margins, "run_in_workers", run)
+    monkeypatch.setattr(log, "run_in_workers", run)
     return done
 
 

@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pytest
 import typer
 from hypothesis import example, given, settings
@@ -211,14 +212,76 @@ def test_a_world_that_cannot_be_built_is_a_finding_at_its_key(tmp_path):
 @pytest.mark.parametrize(
     ("ground", "reason"),
     [
-        ("size: [1.0e+6, 12.0]", "at most 20000000 samples, not 4e+06 x 48"),
-        ("size: [1.0e+308, 1.0e+308]", "at most 20000000 samples, not inf x inf"),
-        ("size: [40.0, -3.0]", "lengths of more than 0 m, not 40 m x -3 m"),
+        ("size: [1.0e+6, 12.0]", "expected at most 20000000 samples, got 4e+06 x 48"),
+        ("size: [1.0e+308, 1.0e+308]", "expected at most 20000000 samples, got inf x inf"),
+        ("size: [40.0, -3.0]", "expected lengths of more than 0 m, got 40 m x -3 m"),
     ],
 )
 def test_a_ground_of_too_many_samples_or_none_is_refused_before_it_is_drawn(ground, reason, tmp_path):
     scenario = write(tmp_path, [("trial.yaml", "world", f"{{type: generated, median_slope: 3.0, {ground}}}", "")])
     assert [reason in finding.text for finding in check_scenario(load_yaml(scenario)).findings] == [True]
+
+
+@pytest.mark.parametrize(
+    ("changes", "mistake"),
+    [
+        (
+            {"world": "{type: generated, size: [6.0, 0.0]}"},
+            "5: world.size: expected lengths of more than 0 m, got 6 m x 0",
+        ),
+        (
+            {"world": "{type: heightfield, file: hill.npz, crop: [50.0, 60.0, 0.0, 1.0]}"},
+            "5: world.crop: expected a part of x 0 to 4, y 0 to 4 [m] with 2 x 2 samples or more, got x 50 to 60",
+        ),
+        ({"world": "{type: heightfield, file: no.tif}"}, "5: world.file: expected an elevation model, got "),
+        ({"world": "{type: mesh, file: no.ply}"}, "5: world.file: expected a mesh to drive on, got "),
+        (
+            {"world": "{type: generated, size: [400.0, 400.0], spacing: 0.25}"},
+            "5: world: expected at most 2097152 samples for Bullet (crop it, or set a larger spacing), got 1601 x 1601",
+        ),
+        ({"obstacles": "[{x: 1.0, y: 1.0}, {x: 70.0, y: 1.0}]"}, "9: obstacles[1]: expected a place on the ground"),
+        (
+            {"forests": "[{x_range: [9.0, 2.0], y_range: [1.0, 2.0]}]"},
+            "9: forests[0].x_range: expected two numbers, the smaller first, got 9, 2",
+        ),
+        (
+            {"actors": "[{type: walker, route: [[1.0, 1.0], [1.0, 9.0]]}]"},
+            "9: actors[0].route[1]: expected a place on the ground of the world, got (1, 9)",
+        ),
+        (
+            {"actors": "[{type: walker, route: []}]"},
+            "9: actors[0].route: expected a list of at least 1 items, got a list of 0 items",
+        ),
+        (
+            {
+                "actors": "[{type: crowd}]",
+                "world": "{type: garage}",
+                "start": "{x: 5.0, y: 5.0}",
+                "goals": "[{x: 6, y: 5}]",
+            },
+            "9: actors[0]: expected no crowd in a world without a 2D map to draw its routes on, got 4 people",
+        ),
+        (
+            {"actors": "[{type: crowd, x_range: [0.1, 0.2]}]", "world": "{type: office}"},
+            "9: actors[0]: expected room to walk between the walls, got no route of 4 corners with 0.4 m to the walls",
+        ),
+        (
+            {"world": "{type: generated, features: [{type: boulders, radius_min: 1.0, radius_max: 0.5}]}"},
+            "5: world.features[0]: expected a radius_min of at most radius_max, got 1 and 0.5",
+        ),
+        (
+            {"world": "{type: generated, features: [{type: ridge, points: [[1, 1]], height: 1.0, width: 1.0}]}"},
+            "5: world.features[0].points: expected a list of at least 2 items, got a list of 1 items",
+        ),
+    ],
+)
+def test_what_contradicts_the_world_is_one_finding_at_its_key(changes, mistake, tmp_path):
+    np.savez(tmp_path / "hill.npz", z=np.zeros((5, 5)), dx=1.0, dy=1.0)
+    scenario = write(tmp_path, [("trial.yaml", key, value, "") for key, value in changes.items()])
+
+    findings = check_scenario(load_yaml(scenario)).findings
+
+    assert [finding.text.startswith(f"{scenario}:{mistake}") for finding in findings] == [True], findings
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())

@@ -6,11 +6,13 @@ import pytest
 import typer
 
 from mbf_abstract.config.findings import ConfigError
+from terrain.scenarios.perturbation import Perturbation, draw_disturbance
+from terrain.scenarios.places import PlanarPose
 from terrain.scenarios.scenario import MapWorld, load_scenario
 from terrain.sweeps.command import parse_seeds, parse_settings
 from terrain.sweeps.log import SweepLog
 from terrain.sweeps.report import summarise, write_tables
-from terrain.sweeps.sweep import SweepRun, hash_of, is_done, plan_sweep, run_once
+from terrain.sweeps.sweep import SweepRun, hash_of, is_done, plan_sweep, run_once, run_unless_refused
 
 
 def row(seed, variant="planner=cvp", success=True, **more):
@@ -119,6 +121,40 @@ def test_a_run_that_cannot_begin_says_why_without_a_folder_that_has_another_name
     assert (
         first["message"].startswith("navigation.yaml:") and "planer_patience: expected a known key" in first["message"]
     )
+
+
+@pytest.mark.parametrize("known", [[], [{"variant": "speed=x", "refused": True, "message": "no"}]])
+def test_settings_that_are_refused_are_tried_once_and_known_for_all_their_seeds(known):
+    tried = []
+
+    def do(job):
+        tried.append(job)
+        refused = job[1].variant == "speed=x"
+        return {"variant": job[1].variant, "refused": refused, "message": "no" if refused else ""}
+
+    def spread(jobs, wanted):
+        return ((job, do(job)) for job in filter(wanted, jobs))
+
+    jobs = [(None, run) for run in plan_sweep(range(5), {"speed": ["x", "1"]})]
+    rows = list(run_unless_refused(jobs, known, spread))
+
+    assert sorted(job[1].key("") for job, _ in rows) == sorted(job[1].key("") for job in jobs)
+    assert len(tried) == 5 + (not known)
+    assert all(row["message"] == ("no" if job[1].variant == "speed=x" else "") for job, row in rows)
+
+
+def test_a_start_that_the_seed_has_drawn_off_the_ground_refuses_no_other_seed():
+    scenario = load_scenario("outdoor")
+    start = PlanarPose(x=0.1, y=0.1)
+    shifted = scenario.model_copy(update={"start": start, "perturb": Perturbation(start_position=5.0)})
+    off = scenario.model_copy(update={"start": PlanarPose(x=-5.0, y=0.0)})
+    seed = next(seed for seed in range(9) if draw_disturbance(shifted.perturb, seed).dx < -1.0)
+
+    drawn, written = (run_once((one, SweepRun(seed))) for one in (shifted, off))
+
+    assert (drawn["outcome"], drawn["refused"]) == ("DrawnError", False)
+    assert (written["outcome"], written["refused"]) == ("ConfigError", True)
+    assert written["verdict"].startswith("refused with every seed: scenario:1: start or goals: expected a place on the")
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ import json
 import pytest
 
 from mbf_abstract.config.findings import ConfigError
-from terrain.experiments.table1 import campaign as campaign_module
 from terrain.experiments.table1.campaign import Campaign, hash_of_parameters, tally_of
 from terrain.experiments.table1.environments.world import WAREHOUSE, load_world
+from terrain.sweeps import log
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def work(monkeypatch, tally):
             made = tally(planner=6 + job.seed)
             yield job, {"tally": json.loads(json.dumps(made, default=vars)), "digest": job.name}
 
-    monkeypatch.setattr(campaign_module, "run_in_workers", run_all)
+    monkeypatch.setattr(log, "run_in_workers", run_all)
     return done
 
 

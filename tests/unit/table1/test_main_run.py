@@ -10,11 +10,12 @@ from scipy import ndimage
 
 from terrain.experiments.table1.environments import traffic
 from terrain.experiments.table1.environments.traffic import CARRIER, HALF_WIDTH, Box, make_traffic, run_ahead
-from terrain.experiments.table1.main_run import buildings, conditions, run, table, trial
+from terrain.experiments.table1.main_run import buildings, conditions, table, trial
 from terrain.experiments.table1.main_run.conditions import CONDITIONS
 from terrain.experiments.table1.main_run.floor_plans import draw_world, has_detours
 from terrain.experiments.table1.main_run.run import known_rows, run_missing, trials
 from terrain.experiments.table1.main_run.trial import Trial, hash_of_parameters, tally_of
+from terrain.sweeps import log
 
 FROZEN = {"warehouse": "602b0892a9f9", "plans": "4a68ab9c427c"}  # commit 9288830
 PLANS = [draw_world(seed) for seed in range(100, 112)]
@@ -86,7 +87,7 @@ def work(monkeypatch, tally):
             done.append((job.building, job.seed, job.condition))
             yield job, json.loads(json.dumps(trial.row_of(tally(planner=job.seed))))
 
-    monkeypatch.setattr(run, "run_in_workers", run_all)
+    monkeypatch.setattr(log, "run_in_workers", run_all)
     return done
 
 

@@ -14,8 +14,7 @@ from terrain.experiments.table1.main_run.buildings import buildings
 from terrain.experiments.table1.main_run.conditions import CONDITIONS
 from terrain.experiments.table1.main_run.trial import Trial, hash_of_parameters, run_trial
 from terrain.provenance.code import commit_of
-from terrain.sweeps.log import SweepLog
-from terrain.sweeps.worker_pool import run_in_workers
+from terrain.sweeps.log import SweepLog, rows_of
 
 Rows = dict[Trial, dict[str, Any]]
 
@@ -39,9 +38,6 @@ def known_rows(file: Path, asked: Sequence[Trial]) -> Rows:
 
 def run_missing(file: Path, asked: Sequence[Trial], workers: int) -> Iterator[tuple[Trial, dict[str, Any]]]:
     """Run what the file does not hold and append each row as it is done."""
-    commit = commit_of(Path(__file__))[:10]
-    with SweepLog(file) as log:
-        missing = [trial for trial in asked if trial.key not in log.rows]
-        for trial, row in run_in_workers(run_trial, missing, workers):
-            log.append(trial.key, {**row, "commit": commit})
-            yield trial, row
+    known = known_rows(file, asked)
+    missing = {trial: trial.key for trial in asked if trial not in known}
+    return rows_of(missing, file, run_trial, workers, commit=commit_of(Path(__file__))[:10])
