@@ -27,9 +27,8 @@ MAX_SAMPLES = 20_000_000  # unless a caller asks for more; absurd sizes are refu
 def samples(length_x: float, length_y: float, spacing: float) -> tuple[int, int]:
     """Samples about ``spacing`` [m] apart on a rectangle [m], along x and y; ValueError for none and for too many."""
     if not min(length_x, length_y, spacing) > 0.0:
-        raise ValueError(
-            f"expected lengths of more than 0 m, got {length_x:g} m x {length_y:g} m with samples {spacing:g} m apart"
-        )
+        got = f"{length_x:g} m x {length_y:g} m with samples {spacing:g} m apart"
+        raise ValueError(f"expected lengths of more than 0 m, got {got}")
     along_x, along_y = length_x / spacing, length_y / spacing
     if not along_x * along_y <= MAX_SAMPLES:
         raise ValueError(f"expected at most {MAX_SAMPLES} samples, got {along_x:.3g} x {along_y:.3g}")
@@ -205,9 +204,8 @@ class Heightfield:
         ix = np.flatnonzero(np.abs(self.x0 + self.dx * np.arange(self.nx) - (x_min + x_max) / 2) <= (x_max - x_min) / 2)
         iy = np.flatnonzero(np.abs(self.y0 + self.dy * np.arange(self.ny) - (y_min + y_max) / 2) <= (y_max - y_min) / 2)
         if ix.size < 2 or iy.size < 2:
-            expected = f"a part of x {self.x0:g} to {self.x_max:g}, y {self.y0:g} to {self.y_max:g} [m]"
-            got = f"x {x_min:g} to {x_max:g}, y {y_min:g} to {y_max:g}, which leaves {iy.size} x {ix.size}"
-            raise ValueError(f"expected {expected} with 2 x 2 samples or more, got {got}")
+            here = f"x {self.x0:g} to {self.x_max:g}, y {self.y0:g} to {self.y_max:g} [m] with 2 x 2 samples or more"
+            raise ValueError(f"expected a part of {here}, got x {x_min:g} to {x_max:g}, y {y_min:g} to {y_max:g}")
         heights = self.heights[iy[0] : iy[-1] + 1, ix[0] : ix[-1] + 1]
         return Heightfield(heights, self.dx, self.dy, self.x0 + ix[0] * self.dx, self.y0 + iy[0] * self.dy)
 
