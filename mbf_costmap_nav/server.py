@@ -20,6 +20,7 @@ from mbf_abstract.config.configuration import Config, PluginDeclaration
 from mbf_abstract.config.findings import ConfigError, Finding, describe_value
 from mbf_abstract.config.registry import Adapter
 from mbf_abstract.events import EventKind
+from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.maps.view import FloorMap, GridView
 from mbf_abstract.parameters import ParameterError, ParameterModel, parameter
@@ -176,14 +177,17 @@ class CostmapNavigationServer(MapServer):
         section = config.sections[key]
         parameters = cast(CostmapParameters, section.parameters)
         layer_classes: dict[str, Any] = {layer.type_name: layer.layer_class for layer in section.layers}
-        costmap = build_layered_costmap(
-            parameters,
-            {layer.name: cast(Any, layer.parameters) for layer in section.layers},
-            load_layer=layer_classes.__getitem__,
-            base_folder=config.path.parent,
-            transforms=self.runtime.transforms,
-            static_maps=static_maps,
-        )
+        try:
+            costmap = build_layered_costmap(
+                parameters,
+                {layer.name: cast(Any, layer.parameters) for layer in section.layers},
+                load_layer=layer_classes.__getitem__,
+                base_folder=config.path.parent,
+                transforms=self.runtime.transforms,
+                static_maps=static_maps,
+            )
+        except LayerListError as error:
+            raise LayerListError(f"{config.path}: {key}: {error}") from error
         frequency, tolerance = parameters.update_frequency, parameters.transform_tolerance
         return ServedMap(costmap, self.runtime, key, parameters, frequency, tolerance)
 

@@ -39,7 +39,7 @@ class CoordinateCommand(TyperCommand):
 
 
 def join_numbers(arguments: list[str]) -> list[str]:
-    """Turn ``--start -1 2 --json`` into ``--start=-1,2 --json``."""
+    """Turn ``--start -1 2 --json`` into ``--start=-1,2 --json``, and ``--start -1,2`` likewise."""
     joined: list[str] = []
     collecting = False
     for argument in arguments:
@@ -68,7 +68,7 @@ def parse_place(text: str, option: str) -> Place:
 
 def _is_number(text: str) -> bool:
     try:
-        float(text)
+        [float(part) for part in text.split(",")]
     except ValueError:
         return False
     return True

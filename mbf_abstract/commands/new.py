@@ -8,6 +8,7 @@ command by adding such a folder. What runs on every map has its templates here, 
 from __future__ import annotations
 
 import keyword
+import shlex
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
@@ -51,7 +52,7 @@ def new(
     with readable_errors():
         package = write_package(kind, name.replace("-", "_"), map_name, out)
     typer.echo(f"wrote {package}")
-    typer.echo(f"next: pip install -e '{package}[test]' && pytest {package}")
+    typer.echo(f"next: pip install -e {shlex.quote(f'{package}[test]')} && pytest {shlex.quote(str(package))}")
 
 
 def write_package(kind: str, name: str, map_name: str, out: Path) -> Path:

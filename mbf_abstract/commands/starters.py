@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -53,7 +54,7 @@ def config(
         with out.open("x", encoding="utf-8") as file:
             file.write(text)
     typer.echo(f"wrote {out}")
-    typer.echo(f"next: set speeds, outline and sensors to those of your robot, then mbf check {out}")
+    typer.echo(f"next: set speeds, outline and sensors to those of your robot, then mbf check {shlex.quote(str(out))}")
 
 
 def starters() -> dict[str, str]:
@@ -78,7 +79,8 @@ def starter_text(name: str, map_file: Path | None = None, out: Path | None = Non
     Raises
     ------
     ValueError
-        There is no such starter, it has a map and none is given, or it has none and one is given.
+        There is no such starter, it has a map and none is given, or it has none and one is given, or one of a kind that
+        other servers read.
     FileNotFoundError
         There is no such map.
     """
@@ -94,8 +96,19 @@ def starter_text(name: str, map_file: Path | None = None, out: Path | None = Non
         raise ValueError(f"{name} needs a map: --map FILE")
     if not map_file.exists():
         raise FileNotFoundError(f"--map {map_file}: no such file")
+    _refuse_other_maps(text, map_file)
     place = map_file if out is None else Path(os.path.relpath(map_file, out.parent))
     return Template(text).substitute(map_file=json.dumps(place.as_posix(), ensure_ascii=False))
+
+
+def _refuse_other_maps(text: str, map_file: Path) -> None:
+    """Raise ValueError for a map whose ending only servers of other backends know; an unknown one is checked later."""
+    points = installed_points("mbf.map_files")
+    reading = [point.value for point in points if map_file.is_file() and f".{point.name}" == map_file.suffix.lower()]
+    backends = {point.value: point.name for point in installed_points("mbf.servers")}
+    backend = next(line.split()[1] for line in text.splitlines() if line.startswith("backend:"))
+    if reading and backend not in (others := [backends[value] for value in reading if value in backends]):
+        raise ValueError(f"--map {map_file}: expected a map of the backend {backend}, got one of {', '.join(others)}")
 
 
 def _summary(text: str) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.navigation_map import NavigationMap
-from mbf_abstract.maps.queries import PADDED, CellState
+from mbf_abstract.maps.queries import PADDED, CellState, PlaceAnswer
 
 MOTIONS = (
     ("backing up", Twist.planar(-1.0), "m"),
@@ -34,7 +34,7 @@ def getting_free(navigation_map: NavigationMap, pose: Pose) -> str:
 def _ways(navigation_map: NavigationMap, pose: Pose, motions: tuple[tuple[str, Twist, str], ...]) -> list[str]:
     """Texts of the motions that help."""
     check = navigation_map.pose_check(PADDED)
-    least = WORTH_NAMING if check(pose).state is not CellState.LETHAL else 0.0
+    least = 0.0 if _is_blocked(check(pose)) else WORTH_NAMING
     ways = []
     for name, motion, unit in motions:
         for distance in DISTANCES:
@@ -42,10 +42,15 @@ def _ways(navigation_map: NavigationMap, pose: Pose, motions: tuple[tuple[str, T
                 break
             x, y, yaw = arc_poses((pose.x, pose.y, pose.yaw), *_planar(motion), distance, distance)[-1].tolist()
             there = Pose((x, y, pose.z), Pose.planar(0.0, 0.0, yaw).orientation, pose.frame_id)
-            if distance >= least and check(there).state is not CellState.LETHAL:
+            if distance >= least and not _is_blocked(check(there)):
                 ways.append(f"{name} {distance:g} {unit}")
                 break
     return ways
+
+
+def _is_blocked(answer: PlaceAnswer) -> bool:
+    """Whether the robot touches something, or reaches off the map, which hides what it touches beside that."""
+    return CellState.LETHAL in (answer.state, answer.known) or answer.state is CellState.OUTSIDE
 
 
 def _planar(motion: Twist) -> tuple[float, float, float]:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.inflation import InflationRadii
 from mbf_abstract.maps.layers.layer import LayerParameters
+from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import FREE, INSCRIBED, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
@@ -87,7 +88,7 @@ class InflationLayer(CostmapLayer):
         if self._radius > LARGEST_RADIUS:
             of_robot = radius > self.parameters.inflation_radius
             name = "the robot's inscribed radius" if of_robot else "inflation_radius"
-            raise ValueError(
+            raise LayerListError(
                 f"layer {self.name!r}: {name} is {self._radius:g} cells of {self.geometry.resolution:g} m, "
                 f"at most {LARGEST_RADIUS} are possible; lengths are in metres"
             )

@@ -85,12 +85,20 @@ class LayerAnswers(SnapshotAnswers):
                         f"layer {layer.name!r} comes behind the last inflation layer, which inflates what is before it"
                     )
                     warnings.append(f"{text}: planners treat the robot as a point beside what {layer.name!r} marks")
-            grid, reach = self.geometry, self.footprint.circumscribed_radius
-            nearest = 0.5 * grid.resolution * min(grid.width, grid.height)
-            if self.rolling_window and nearest < reach:
-                text = f"the window ends {nearest:.3g} m from the robot's base, but the outline reaches {reach:.3g} m"
-                warnings.append(f"{text}: what the robot touches beyond it is not seen; make width and height larger")
+            warnings += self._size_warnings()
             return warnings
+
+    def _size_warnings(self) -> list[str]:
+        """What is suspicious about the sizes of window, cells and robot."""
+        grid, robot, warnings = self.geometry, self.footprint, list[str]()
+        nearest, reach = 0.5 * grid.resolution * min(grid.width, grid.height), robot.circumscribed_radius
+        if self.rolling_window and nearest < reach:
+            text = f"the window ends {nearest:.3g} m from the robot's base, but the outline reaches {reach:.3g} m"
+            warnings.append(f"{text}: what the robot touches beyond it is not seen; make width and height larger")
+        if 0.0 < 2.0 * robot.inscribed_radius < grid.resolution:
+            text = f"cells are {grid.resolution:.3g} m wide, the robot {2.0 * robot.inscribed_radius:.3g} m"
+            warnings.append(f"{text}: gaps that it fits through look closed; make resolution smaller")
+        return warnings
 
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Lowest speed [m/s] the layers allow at the point (x, y) [m]; ``full_speed`` where there is no limit.

@@ -118,3 +118,17 @@ def test_the_path_of_the_map_starts_at_the_configuration_and_a_file_is_not_overw
     assert mbf(*arguments, "--out", "config/robot.yaml").exit_code == 0
     assert 'map_file: "../maps/my office.yaml"' in Path("config/robot.yaml").read_text()
     assert mbf(*arguments, "--out", "config/robot.yaml").exit_code == 2
+
+
+@pytest.mark.parametrize(("name", "expected"), [("mesh_differential", "mesh"), ("costmap_car", "costmap")])
+def test_a_map_of_another_kind_is_refused_before_a_file_is_written(name, expected, tmp_path):
+    (tmp_path / "my ground.ply").write_bytes(b"ply\n")
+    file, other = (OFFICE, "costmap") if expected == "mesh" else (tmp_path / "my ground.ply", "mesh")
+    result = mbf("config", name, "--map", file, "--out", tmp_path / "robot.yaml")
+    assert result.exit_code == 2 and not (tmp_path / "robot.yaml").exists()
+    assert f"{file}: expected a map of the backend {expected}, got one of {other}" in result.output
+
+
+def test_the_next_command_is_printed_as_a_shell_takes_it(tmp_path):
+    result = mbf("config", "costmap_car", "--map", OFFICE, "--out", tmp_path / "my robot.yaml")
+    assert f"then mbf check '{tmp_path}/my robot.yaml'" in result.output

@@ -73,7 +73,8 @@ class LayerStack(Mapping[str, Layer_co], Generic[Layer_co]):
 
     def note(self, layer: MapLayer, error: BaseException) -> None:
         """Keep as ``problem`` what a layer raised."""
-        self.problem = f"layer {layer.name!r} raised {type(error).__name__}: {error_text(error)}"
+        raised = f"layer {layer.name!r} raised {type(error).__name__}: {error_text(error)}"
+        self.problem = str(error) if isinstance(error, LayerListError) else raised  # which names the layer itself
 
     def stale_reason(self, now: float) -> str:
         """Which layer raised, or why the first stale layer is so at ``now`` [s]; empty if all are fresh."""

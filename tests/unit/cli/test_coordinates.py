@@ -16,6 +16,10 @@ def test_negative_numbers_belong_to_the_option_before_them():
     assert joined == ["map.yaml", "--start=-1.5,2", "--goal=3,-4e-1,0", "--json"]
 
 
+def test_numbers_with_commas_between_them_belong_to_the_option_too():
+    assert join_numbers(["--start", "-1,2", "--goal", "3,4", "0.5", "a,b"]) == ["--start=-1,2", "--goal=3,4,0.5", "a,b"]
+
+
 def test_an_equals_sign_may_stand_before_the_first_number():
     assert join_numbers(["--start=-1", "2", "map.yaml"]) == ["--start=-1,2", "map.yaml"]
 

@@ -96,5 +96,18 @@ def test_a_robot_at_a_wall_gets_away_by_what_leads_from_it():
     assert getting_free(HalfPlane(), Pose.planar(-0.4, 0.0, 1.5708)).startswith("it gets away by moving left")
 
 
+class AtTheEdge(HalfPlane):
+    """The map ends where the wall begins, and hides it from whoever reaches beyond."""
+
+    def pose_check(self, query, *, center_only=False):
+        check = super().pose_check(query)
+        return lambda pose: PlaceAnswer(CellState.OUTSIDE, 2.0) if pose.x > -0.3 else check(pose)
+
+
+def test_a_motion_along_a_wall_at_the_edge_of_the_map_is_no_way_out():
+    assert getting_free(AtTheEdge(), Pose.planar(-0.1, 0.0, 1.5708)) == "it gets away by moving left 0.5 m"
+    assert getting_free(AtTheEdge(), Pose.planar(-0.1, 0.0)) == "it gets away by backing up 0.5 m"
+
+
 def test_inside_of_an_obstacle_nothing_is_promised():
     assert getting_free(HalfPlane(), Pose.planar(3.0, 0.0)) == "no straight motion and no turn on the spot gets it away"

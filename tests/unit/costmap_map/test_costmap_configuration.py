@@ -137,6 +137,14 @@ def test_an_inflation_narrower_than_the_robot_is_widened_and_reported_until_the_
     assert costmap.configuration_warnings() == []
 
 
+@pytest.mark.parametrize(("radius", "said"), [(0.4, True), (0.6, False), (0.0, False)])
+def test_cells_wider_than_the_robot_are_reported(build, radius, said):
+    warnings = build(
+        "inflation", inflation={"inflation_radius": 1.0}, robot_radius=radius, resolution=1.0
+    ).configuration_warnings()
+    assert [warning.startswith("cells are 1 m wide, the robot 0.") for warning in warnings] == [True] * said
+
+
 def test_unknown_cells_are_inflated_only_on_request(build):
     edge = Costmap(np.array([[254, 255, 0, 0, 0, 0]], dtype=np.uint8), 1.0)
     results = []

@@ -228,7 +228,7 @@ def test_while_a_layer_cannot_take_the_new_grid_the_costmap_is_stale_and_blocked
     for now in (0.1, 0.2):
         with pytest.raises(ValueError, match="inflation_radius is"):
             one.update(None, now)
-        assert "layer 'inflation' raised ValueError" in one.stale_reason(now)
+        assert "layer 'inflation': inflation_radius is" in one.stale_reason(now)
         assert (one.snapshot().cells == LETHAL).all()
     one.take_floor("/map", floor())
     one.update(None, 0.3)

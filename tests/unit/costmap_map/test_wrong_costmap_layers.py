@@ -96,7 +96,7 @@ def test_a_box_of_parts_of_cells_is_its_layers_fault_and_not_that_of_the_first_o
 def test_a_robot_too_large_for_the_cells_is_named_and_not_the_layer_that_is_widened_to_it():
     parameters = CostmapParameters(robot_radius=20.0, resolution=0.05, layers=[{"name": "mine", "type": "inflation"}])
     expected = (
-        r"layer 'mine': the robot's inscribed radius is 393 cells of 0.05 m, at most 253 are possible; lengths are"
+        r"^layer 'mine': the robot's inscribed radius is 393 cells of 0.05 m, at most 253 are possible; lengths are"
     )
     with pytest.raises(ValueError, match=expected):
         build_layered_costmap(parameters)
