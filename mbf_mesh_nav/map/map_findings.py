@@ -23,6 +23,8 @@ FACING = 0.85
 """Cosine of the angle between a normal and an axis below which a face does not look along it."""
 LYING = 1.75
 """A mesh lies on its side if so many times as much of it looks along one axis as along either side of the others."""
+ROOM = 8.0
+"""So many inscribed radii along either side are hardly room to drive: a mesh in another unit is likelier."""
 NOWHERE = np.zeros(0, dtype=np.int64)
 
 
@@ -133,20 +135,27 @@ def _bodies(mesh_map: MeshMap) -> Iterator[Finding]:
 
 
 def _lethal(mesh_map: MeshMap) -> Iterator[Finding]:
-    """One finding if nearly every vertex of the default layer is lethal, with the layers that are as lethal."""
-    used = np.diff(mesh_map.neighbour_offsets) > 0
-    shares = {name: float(layer.lethal[used].mean()) for name, layer in mesh_map.layers.items()}
-    default = mesh_map.default_layer
-    if default is None or shares[default] < LETHAL_SHARE:
+    """One finding if nearly every vertex of the default layer is lethal or forbidden, with the layers that are."""
+    used, default = np.diff(mesh_map.neighbour_offsets) > 0, mesh_map.default_layer
+    if default is None:
+        return
+    closed = {name: layer.lethal[used] for name, layer in mesh_map.layers.items()}
+    closed[default] = closed[default] | (mesh_map.layers[default].costs[used] >= FORBIDDEN_COST)
+    shares = {name: float(of_layer.mean()) for name, of_layer in closed.items()}
+    if shares[default] < LETHAL_SHARE:
         return
     guilty = ", ".join(f"{name} {share:.0%}" for name, share in shares.items() if share >= LETHAL_SHARE)
-    text = f"nearly every vertex is lethal, so nothing can be planned (layers: {guilty})"
+    kind = "" if mesh_map.layers[default].lethal[used].mean() >= LETHAL_SHARE else " or costs 1, the usual cost_limit"
+    text = f"nearly every vertex is lethal{kind}, so nothing can be planned (layers: {guilty})"
     first, second, third = (mesh_map.vertices[mesh_map.faces[:, corner]] for corner in range(3))
     seen_along = np.abs(np.cross(second - first, third - first)).sum(axis=0)  # doubled areas in the three plan views
+    length, width, _ = np.ptp(mesh_map.vertices, axis=0).tolist()
     if seen_along.argmax() != 2:
         axis = AXES[int(seen_along.argmax())]
         text += f"; most faces look along {axis}: if that is up in the file, set up_axis: {axis}"
-    indices = np.flatnonzero(mesh_map.layers[default].lethal & used)
+    elif min(length, width) < ROOM * mesh_map.inscribed_radius:
+        text += f"; the mesh is {length:.3g} m x {width:.3g} m, hardly room for the robot: see unit"
+    indices = np.flatnonzero(used)[closed[default]]
     yield Finding("lethal", text, indices, harmless=True)
 
 

@@ -206,6 +206,8 @@ def _all_that_is_wrong(
     backend = options.backend or document.data.get("backend")
     chosen = backend if isinstance(backend, str) else None
     findings = check_scenario(document, chosen, options.seed, options.settings, change=change).findings
+    if isinstance(error, ConfigError) and not findings:  # of what only the run has found, such as robots in each other
+        findings = tuple(document.located(one) if one.file == "scenario" else one for one in error.findings)
     return ConfigError(findings) if findings else error
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from mbf_abstract.geometry import FloatArray
 from terrain.scenarios.actors import add_actors
-from terrain.scenarios.obstacles import add_obstacles
-from terrain.scenarios.places import coordinates
+from terrain.scenarios.obstacles import Obstacle, add_obstacles
+from terrain.scenarios.places import coordinates, off_the_ground
 from terrain.scenarios.scenario import Scenario, robot_scenarios
 from terrain.scenarios.world import ScenarioWorld, build_world
 from terrain.worlds.map_files import MapFiles
@@ -34,13 +35,27 @@ def build_environment(scenario: Scenario, folder: Path, seed: int) -> tuple[Scen
     world = build_world(scenario.world, files, rng, keep_clear, 1.0 / scenario.physics_rate, is_kinematic)
     try:
         rng = np.random.default_rng([seed, FOREST_STREAM])
-        posts = [post for forest in scenario.forests for post in forest.posts(rng, keep_clear, world.height_at)]
+        posts = _posts(scenario, rng, keep_clear, world)
         obstacles = add_obstacles(world.physics, [*scenario.obstacles, *posts], world.height_at)
         add_actors(world, scenario.actors, np.random.default_rng([seed, ACTOR_STREAM]))
     except BaseException:
         world.physics.close()
         raise
     return world, obstacles
+
+
+def _posts(
+    scenario: Scenario, rng: np.random.Generator, keep_clear: FloatArray, world: ScenarioWorld
+) -> list[Obstacle]:
+    """Posts of all forests; raises ConfigError for one that is off the ground."""
+    posts: list[Obstacle] = []
+    for number, forest in enumerate(scenario.forests):
+        drawn = forest.posts(rng, keep_clear, world.height_at)
+        x, y = 0.5 * sum(forest.x_range), 0.5 * sum(forest.y_range)
+        if forest.count and not drawn and not math.isfinite(world.height_at(x, y)):
+            raise off_the_ground(f"forests[{number}]", x, y)
+        posts += drawn
+    return posts
 
 
 def with_noise(scenario: Scenario) -> Scenario:

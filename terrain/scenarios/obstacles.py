@@ -31,6 +31,14 @@ class Obstacle(ParameterModel):
     yaw: float = parameter(0.0, "Heading.", unit="rad", ge=-FULL_TURN, le=FULL_TURN)
     size: Size = parameter((0.5, 0.5, 1.0), "Length, width, height; a cylinder's diameter.", unit="m")
 
+    def holds(self, x: float, y: float) -> bool:
+        """Whether a place [m] lies inside it, seen from above."""
+        cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
+        along, across = (x - self.x) * cosine + (y - self.y) * sine, (y - self.y) * cosine - (x - self.x) * sine
+        if self.shape == "cylinder":
+            return math.hypot(along, across) < 0.5 * self.size[0]
+        return abs(along) < 0.5 * self.size[0] and abs(across) < 0.5 * self.size[1]
+
 
 class Forest(ParameterModel):
     """Posts at places drawn from the seed, each with room around it to drive through."""

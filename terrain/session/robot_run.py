@@ -204,7 +204,10 @@ def success_by_path_length(success: bool, metrics: Mapping[str, Any]) -> float |
     if not success:
         return 0.0
     shortest = metrics.get("geodesic_m")
-    return None if shortest is None else round(shortest / max(shortest, metrics["path_length_m"]), 6)
+    if shortest is None:
+        return None
+    longest = max(shortest, metrics["path_length_m"])
+    return round(shortest / longest, 6) if longest > 0.0 else 1.0  # who stood at its goal has driven no detour
 
 
 def _compare_with_geodesic(recording: Recording, world: ScenarioWorld, driven: float) -> dict[str, float]:

@@ -160,6 +160,11 @@ def _check_places(scenario: Scenario, world: ScenarioWorld, document: YamlDocume
             continue
         if world.has_wall_at(pose):
             findings.append(document.finding(key, "a place outside the walls", f"({pose.x:g}, {pose.y:g})"))
+        for number, obstacle in enumerate(scenario.obstacles if key[-1] == "start" else ()):
+            apart = abs(pose.z - world.height_at(obstacle.x, obstacle.y))
+            if obstacle.holds(pose.x, pose.y) and apart < obstacle.size[2]:
+                at = f"({pose.x:g}, {pose.y:g}), inside of obstacles[{number}]"
+                findings.append(document.finding(key, "a place outside the obstacles", at))
 
 
 def _check_server(

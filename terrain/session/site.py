@@ -119,7 +119,7 @@ def _refuse_overlaps(scenario: Scenario, robots: Mapping[str, AnyRobot]) -> None
             apart = abs(fellow.pose.z - Fellow(robots[name]).pose().z)
             if apart < fellow.size[-1] and fellow.gap(corners) == 0.0:
                 key, at = f"robots[{number}].start", f"({pose.x:.2f}, {pose.y:.2f})"
-                findings.append(Finding(scenario.name, 1, key, f"a place that {other!r} does not stand in", at))
+                findings.append(Finding("scenario", 1, key, f"a place that {other!r} does not stand in", at))
     if findings:
         drawn = any(robot.perturb.start_position for robot in robot_scenarios(scenario).values())
         raise (DrawnError if drawn else ConfigError)(findings)

@@ -29,15 +29,18 @@ def cell_slopes(terrain: Heightfield, resolution: float) -> FloatArray:
     """Slope [degrees] of square cells of ``resolution`` [m], as (ny, nx) float64.
 
     Cell [0, 0] has its lower left corner at the terrain's; heights are smoothed first by a Gaussian whose width (four
-    sigma) is the length of a small robot, 0.5 m.
+    sigma) is the length of a small robot, 0.5 m. A single row or column of cells has no slope across.
     """
-    nx, ny = (int(length / resolution) for length in terrain.size)
+    nx, ny = (max(1, int(length / resolution)) for length in terrain.size)
     x = terrain.x0 + (np.arange(nx) + 0.5) * resolution
     y = terrain.y0 + (np.arange(ny) + 0.5) * resolution
     heights = terrain.height_at(*np.meshgrid(x, y))
     sigma = 0.25 * ROBOT_LENGTH / resolution
     smooth = smoothed(heights, (sigma, sigma))
-    rise_y, rise_x = np.gradient(smooth, resolution)
+    rise_y, rise_x = (
+        np.gradient(smooth, resolution, axis=axis) if cells > 1 else np.zeros_like(smooth)
+        for axis, cells in enumerate(smooth.shape)
+    )
     return np.asarray(np.degrees(arctan(np.hypot(rise_x, rise_y))))
 
 

@@ -127,6 +127,22 @@ def test_a_map_on_which_nearly_everything_is_lethal_says_so_and_guesses_the_axis
     assert "lethal" not in standing
 
 
+@pytest.mark.parametrize("scale", [0.01, 1.0])
+def test_a_mesh_hardly_larger_than_the_robot_says_how_large_it_is(tmp_path, scale):
+    layers = [{"name": "border", "type": "border"}, {"name": "safe", "type": "inflation", "inputs": ["border"]}]
+    vertices, faces = heightfield_mesh(np.zeros((21, 21)), scale, scale)
+    trimesh.Trimesh(vertices, faces, process=False).export(tmp_path / "floor.ply")
+    parameters = MeshMapParameters(mesh_file=str(tmp_path / "floor.ply"), layers=layers, inscribed_radius=0.3)
+
+    report = build_mesh_map(parameters, {"safe": {"inscribed_radius": 0.3, "inflation_radius": 0.5}}).report
+
+    expected = (
+        "nearly every vertex is lethal or costs 1, the usual cost_limit, so nothing can be planned (layers: safe 100%)"
+    )
+    size = "; the mesh is 0.2 m x 0.2 m, hardly room for the robot: see unit"
+    assert report["lethal"].text == expected + size if scale < 1.0 else "lethal" not in report
+
+
 ROOM = np.array([(x, y, z) for x in (0.0, 4.0) for y in (0.0, 5.0) for z in (0.0, 1.5)])
 FLOOR, WALLS = [(0, 4, 6), (0, 6, 2)], [(0, 1, 4), (1, 5, 4), (2, 6, 3), (3, 6, 7), (0, 2, 1), (1, 2, 3)]
 

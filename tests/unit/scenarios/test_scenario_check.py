@@ -241,6 +241,14 @@ def test_a_ground_of_too_many_samples_or_none_is_refused_before_it_is_drawn(grou
         ),
         ({"obstacles": "[{x: 1.0, y: 1.0}, {x: 70.0, y: 1.0}]"}, "9: obstacles[1]: expected a place on the ground"),
         (
+            {"obstacles": "[{x: 2.2, y: 2.6}]"},
+            "7: start: expected a place outside the obstacles, got (2, 2.5), inside of",
+        ),
+        (
+            {"forests": "[{x_range: [90.0, 95.0], y_range: [1.0, 2.0]}]"},
+            "9: forests[0]: expected a place on the ground of the world, got (92.5, 1.5)",
+        ),
+        (
             {"forests": "[{x_range: [9.0, 2.0], y_range: [1.0, 2.0]}]"},
             "9: forests[0].x_range: expected two numbers, the smaller first, got 9, 2",
         ),
@@ -328,3 +336,17 @@ def test_a_check_that_no_package_knows_is_that_of_a_configuration(tmp_path):
     result = CliRunner().invoke(app, [str(tmp_path / "empty.yaml")])
 
     assert result.exit_code == 2 and "an empty file" in result.output
+
+
+def test_robots_that_stand_in_each_other_are_named_with_file_and_line(tmp_path):
+    robots = "[{name: anna, start: {x: 2.0, y: 2.0}, goals: [{x: 3.0, y: 2.0}]},\n"
+    robots += "  {name: ben, start: {x: 2.1, y: 2.0}, goals: [{x: 3.0, y: 3.0}]}]"
+    scenario = write(tmp_path, [("trial.yaml", "robots", robots, ""), ("trial.yaml", "physics", "kinematic", "")])
+    scenario.write_text(
+        "".join(f"{line}\n" for line in scenario.read_text().splitlines() if line[:5] not in ("start", "goals"))
+    )
+
+    result = mbf("run", scenario, "--out", tmp_path / "run", "--quiet")
+
+    assert result.exit_code == 2
+    assert f"{scenario}:8: robots[1].start: expected a place that 'anna' does not stand in" in result.output

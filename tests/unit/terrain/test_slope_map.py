@@ -16,6 +16,13 @@ def plane(degrees: float) -> Heightfield:
     return Heightfield(x * math.tan(math.radians(degrees)), 0.25, 0.25, -2.0, 3.0)
 
 
+@pytest.mark.parametrize(("nx", "ny", "shape"), [(2, 2, (1, 1)), (4, 2, (1, 3)), (2, 3, (2, 1))])
+def test_a_terrain_of_few_samples_has_a_map_of_few_cells(nx: int, ny: int, shape: tuple[int, int]) -> None:
+    _, x = np.mgrid[0:ny, 0:nx] * 1.0
+    slopes = cell_slopes(Heightfield(x, 1.0, 1.0), 1.0)
+    assert slopes == pytest.approx(np.full(shape, 45.0 if nx > 2 else 0.0))
+
+
 @pytest.mark.parametrize(("degrees", "occupancy"), [(3.0, 0), (17.5, 50), (35.0, 100)])
 def test_occupancy_rises_with_slope(degrees: float, occupancy: int) -> None:
     inner = (slice(8, -8), slice(8, -8))

@@ -186,7 +186,13 @@ def test_the_wall_time_of_planners_is_taken_call_by_call():
 
 @pytest.mark.parametrize(
     ("success", "shortest", "driven", "spl"),
-    [(True, 10.0, 12.5, 0.8), (True, 10.0, 9.9, 1.0), (False, 10.0, 10.0, 0.0), (True, None, 10.0, None)],
+    [
+        (True, 10.0, 12.5, 0.8),
+        (True, 10.0, 9.9, 1.0),
+        (True, 0.0, 0.0, 1.0),
+        (False, 10.0, 10.0, 0.0),
+        (True, None, 10.0, None),
+    ],
 )
 def test_success_is_weighted_by_the_length_of_the_path(success, shortest, driven, spl):
     metrics = {"path_length_m": driven} | ({} if shortest is None else {"geodesic_m": shortest})
