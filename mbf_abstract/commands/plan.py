@@ -118,7 +118,7 @@ def _pose(
     heights = server.ground_heights(place.x, place.y)
     if not heights:
         hint = "" if survey or server.survey is None else "; --survey takes coordinates of the survey"
-        notes.append(f"there is no ground at the {name} ({place.x:g}, {place.y:g}); its z is taken as 0 m{hint}")
+        notes.append(f"there is no ground at the {name} ({place.x:.10g}, {place.y:.10g}); its z is taken as 0 m{hint}")
     if len(heights) > 1:
         others = ", ".join(f"{height:.2f}" for height in heights[1:])
         notes.append(f"the {name} is put on the ground at z = {heights[0]:.2f} m; there is more at {others} m: give Z")

@@ -244,6 +244,7 @@ class _Reader:
         sound = len(values) == count and all(abs(value) <= LARGEST for value in values)  # also refuses nan
         if not sound or (least is not None and min(values) <= least):
             bound = f" above {least:g}" if least is not None else ""
+            bound += f" and not beyond {LARGEST:g}" if any(LARGEST < abs(value) < math.inf for value in values) else ""
             self.refuse(element, f"{key}: {name}", f"{wanted}{bound}", repr(text[:60]))
             return None
         return values

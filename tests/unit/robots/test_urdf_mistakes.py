@@ -17,6 +17,10 @@ MISTAKES = {
     "twice": (link("body"), "expected a name of its own, got 'body' twice"),
     "no limit": (joint("j", "body", "x", "0 0 0", "revolute") + link("x"), "joint j: limit: expected an element"),
     "zero axis": (joint("j", "body", "x", "0 0 0", axis="0 0 0") + link("x"), "joint j: axis: expected a direction"),
+    "huge": (
+        joint("j", "body", "x", "0 2e6 0", "fixed") + link("x", 1.0, BOX),
+        "expected 3 finite numbers and not beyond 1e+06, got '0 2e6 0'",
+    ),
     "nan": (joint("j", "body", "x", "0 nan 0", "fixed") + link("x", 1.0, BOX), "expected 3 finite numbers"),
     "macro": (
         "<xacro:property name='w' value='0.3'/>" + link("x", 1.0, BOX),
