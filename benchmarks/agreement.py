@@ -8,9 +8,14 @@ of 0.25 m. With ``--open`` no walls stand around: the map ends in free ground; t
 ``--map car``: a car of 1.0 m x 0.5 m with a turning circle of 0.7 m in rooms of 9 m x 9 m, and what can drive it.
 
     python benchmarks/agreement.py [--quick] [--json] [--seeds 0:40] [--map costmap] [--planners a,b] [--controllers c]
-                                   [--open] [--replan 2] [--results FILE]
+                                   [--open] [--replan 2] [--robots drawn] [--results FILE]
 
 ``--replan`` plans anew so many times a second while the robot drives, as ``move_base`` does with ``planner_frequency``.
+
+``--robots drawn`` draws another robot for each seed, see ``agreement_robots``: discs, rectangles, L-shapes, trapezoids
+about any centre, with inertia, a rate of control and a delay of their own, in rooms as much wider as they are. Plugins
+are given the robot's limits, and keep all other defaults. Each controller drives with one planner a seed, in turn, if
+none is named. Contacts of the outline without padding end a drive; commands beyond a limit are counted.
 
 ``--results`` keeps every finished drive as a JSON line; a drive that is in the file is not repeated.
 """
@@ -30,7 +35,8 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from agreement_worlds import PERIOD, WORLDS, World
+from agreement_robots import drawn_robot
+from agreement_worlds import WORLDS, World
 
 from mbf_abstract.actions.manoeuvre_kept import goes_on, rest_of
 from mbf_abstract.actions.move_base_machine import NO_REPLAN_WITHIN
@@ -42,7 +48,8 @@ from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
 from terrain.sweeps.log import SweepLog
 
 DIST_TOLERANCE, ANGLE_TOLERANCE = 0.1, 0.25
-LONGEST, STANDING = 90.0, 20.0  # s
+LONGEST, STANDING = 90.0, 20.0  # s, of a robot of 0.5 m/s in a room that is not scaled
+USUAL_SPEED = 0.5  # m/s
 SAME_PLACE = 0.1  # m
 NEEDS_PLANNER = {"mesh.vector_field": "cvp"}  # a controller that follows what only this planner adds to its path
 
@@ -59,6 +66,8 @@ class Verdict:
     pose: Pose
     plan_ms: float
     """Milliseconds of CPU that the first plan took."""
+    seconds: float = 0.0
+    """Time of the drive."""
 
     @property
     def agrees(self) -> bool:
@@ -80,15 +89,16 @@ def drive(world: World, planner: Any, controller: Any, replan: float = 0.0) -> V
     With ``replan`` it is planned anew so many times a second besides.
     """
     pose, goal = world.ends
-    path, velocity, refused_at, track, plan_ms = None, Twist(), None, [pose], math.nan
+    period, longest = world.robot.period, longest_drive(world)
+    path, refused_at, track, plan_ms = None, None, [pose], math.nan
     followed: PathTracker | None = None
 
     def ended(ending: str, message: str = "", at: Pose | None = None) -> Verdict:
-        return Verdict(ending, message, at or pose, plan_ms)
+        return Verdict(ending, message, at or pose, plan_ms, period * (len(track) - 1))
 
-    for cycle in range(round(LONGEST / PERIOD)):
+    for cycle in range(round(longest / period)):
         is_due = (
-            replan > 0.0 and cycle % round(1.0 / (replan * PERIOD)) == 0 and pose.distance_to(goal) > NO_REPLAN_WITHIN
+            replan > 0.0 and cycle % round(1.0 / (replan * period)) == 0 and pose.distance_to(goal) > NO_REPLAN_WITHIN
         )
         if path is None or is_due:
             begin = time.process_time()
@@ -106,21 +116,35 @@ def drive(world: World, planner: Any, controller: Any, replan: float = 0.0) -> V
         followed.update(pose.position)
         if controller.is_goal_reached(pose, DIST_TOLERANCE, ANGLE_TOLERANCE):
             return ended("arrived")
-        result = controller.compute_velocity_commands(ControlRequest(pose, velocity))
-        world.clock.time += PERIOD
+        result = controller.compute_velocity_commands(ControlRequest(*world.when_it_acts(pose)))
         if result.success:
-            velocity = result.command
-            pose = world.moved(pose, velocity)
+            world.motion.judge(result.command)
+            pose, touched = world.moved(pose, result.command)
             track.append(pose)
+            if touched:
+                return ended("touched", text_of(result.command))
             continue
-        if not world.fits(pose):
-            return ended("touched", f"{int(result.outcome)} {result.message}")
+        why = f"{int(result.outcome)} {result.message}"
+        pose, touched = world.stopped(pose)
+        if touched or not (world.robot.is_drawn or world.fits(pose)):
+            return ended("touched", why)
         if refused_at is not None and pose.distance_to(refused_at) < SAME_PLACE:
-            return ended("refused", f"{int(result.outcome)} {result.message}")
-        refused_at, path, velocity = pose, None, Twist()
-    since = track[-1 - min(round(STANDING / PERIOD), len(track) - 1) :]
+            return ended("refused", why)
+        refused_at, path = pose, None
+    since = track[-1 - min(round(STANDING / period), len(track) - 1) :]
     stands = all(pose.distance_to(one) < SAME_PLACE for one in since)
-    return ended("stands" if stands else "late", f"after {LONGEST:g} s")
+    return ended("stands" if stands else "late", f"after {longest:g} s")
+
+
+def longest_drive(world: World) -> float:
+    """Time [s] after which a drive is late."""
+    robot = world.robot
+    return round(LONGEST * robot.scale * max(1.0, USUAL_SPEED / robot.max_vel_x)) if robot.is_drawn else LONGEST
+
+
+def text_of(command: Twist) -> str:
+    """A command, readable."""
+    return f"by {command.vx:.2f} m/s, {command.vy:.2f} m/s, {command.wz:.2f} rad/s"
 
 
 def installed(backend: str, kind: PluginKind) -> list[str]:
@@ -140,21 +164,33 @@ def pairs(backend: str) -> list[tuple[str, str]]:
     ]
 
 
+def planners_of(backend: str, seed: int, controller: str, robots: str) -> list[str]:
+    """Planners that a controller drives with: all, or one in turn where robots are drawn."""
+    able = [planner for planner, one in pairs(backend) if one == controller]
+    order = sorted({one for _, one in pairs(backend)}).index(controller)
+    return [able[(seed + order) % len(able)]] if robots else able
+
+
 def run(backend: str, seeds: range, chosen: argparse.Namespace, log: SweepLog) -> Iterator[dict[str, Any]]:
     """Drive every chosen pair over all seeds, or read how it ended; one row for each drive."""
     for seed, (planner, controller) in product(seeds, pairs(backend)):
-        if planner not in (chosen.planners or [planner]) or controller not in (chosen.controllers or [controller]):
+        if controller not in (chosen.controllers or [controller]):
+            continue
+        if planner not in (chosen.planners or planners_of(backend, seed, controller, chosen.robots)):
             continue
         key = "/".join((backend, planner, controller, str(seed), *["open"] * chosen.open))
         key += f"/{chosen.replan:g}" if chosen.replan else ""
+        key += f"/{chosen.robots}" if chosen.robots else ""
         if key not in log.rows:
-            world = WORLDS[backend](seed, chosen.open)
+            robot = drawn_robot(seed, is_disc=backend == "mesh") if chosen.robots else None
+            world = WORLDS[backend](seed, chosen.open, robot)
             if world.ends is None:
                 continue
             made = world.plugin(PluginKind.PLANNER, planner), world.plugin(PluginKind.CONTROLLER, controller)
             verdict = drive(world, *made, chosen.replan)
             place = tuple(round(value, 2) for value in (verdict.pose.x, verdict.pose.y, verdict.pose.yaw))
-            kept = {name: getattr(verdict, name) for name in ("ending", "message", "agrees", "plan_ms")}
+            kept = {name: getattr(verdict, name) for name in ("ending", "message", "agrees", "plan_ms", "seconds")}
+            kept |= {"excess": world.motion.excess} if chosen.robots else {}
             of = {"map": backend, "pair": f"{planner} + {controller}", "planner": planner, "seed": seed}
             log.append(key, {**of, **kept, "place": place})
         yield log.rows[key]
@@ -175,6 +211,7 @@ def main() -> None:
     parser.add_argument("--controllers", type=names, default=[])
     parser.add_argument("--open", action="store_true", help="no walls around")
     parser.add_argument("--replan", type=float, default=0.0, help="plans a second while driving")
+    parser.add_argument("--robots", choices=["drawn"], default="", help="a robot for each seed")
     parser.add_argument("--results", type=Path, default=None, help="file of finished drives")
     chosen = parser.parse_args()
     seeds = range(5) if chosen.quick else range(*map(int, chosen.seeds.split(":")))
@@ -194,6 +231,9 @@ def main() -> None:
     for backend, planner in dict.fromkeys((row["map"], row["planner"]) for row in rows):
         taken = [row["plan_ms"] for row in rows if (row["map"], row["planner"]) == (backend, planner)]
         print(f"{backend:8} {planner:45} median plan {statistics.median(taken):.2f} ms of CPU")
+    for limit in ("speed", "yaw rate", "acceleration") if chosen.robots else ():
+        over = Counter(row["pair"].split(" + ")[1] for row in rows if row["excess"][limit])
+        print(f"drives with commands beyond the {limit}: " + (", ".join(f"{k} {n}" for k, n in over.items()) or "none"))
     print(f"{len(rows)} drives, {sum(not row['agrees'] for row in rows)} do not agree")
 
 

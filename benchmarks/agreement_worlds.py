@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from agreement_robots import Motion, SimulatedRobot
+from agreement_rooms import SIDE, Box, random_boxes
 
 from mbf_abstract.config.registry import PluginRegistry
-from mbf_abstract.geometry import Pose, Twist, quaternions_from_axes
-from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.drive.command_delay import CommandDelay
+from mbf_abstract.geometry import FloatArray, Pose, Twist, quaternions_from_axes
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.plugins import PluginKind
@@ -26,11 +27,12 @@ from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.plugins import MeshContext
 
-SIDE, RESOLUTION, PERIOD = 6.0, 0.05, 0.05
-OUTLINE = [(0.5, 0.25), (-0.5, 0.25), (-0.5, -0.25), (0.5, -0.25)]
-CAR_OUTLINE = [(0.8, 0.25), (-0.2, 0.25), (-0.2, -0.25), (0.8, -0.25)]
+RESOLUTION = 0.05  # m
+RECTANGLE = SimulatedRobot(((0.5, 0.25), (-0.5, 0.25), (-0.5, -0.25), (0.5, -0.25)))
+CAR = SimulatedRobot(((0.8, 0.25), (-0.2, 0.25), (-0.2, -0.25), (0.8, -0.25)))
+DISC = SimulatedRobot(radius=0.25)
 TURNING_RADIUS, CAR_SIDE = 0.7, 9.0
-RADIUS = 0.25
+LONGEST_STOP = 20.0  # s
 PADDED = PlaceQuery(use_padded_footprint=True)
 
 
@@ -60,58 +62,21 @@ class Robot:
         return np.zeros((0, 3))
 
 
-@dataclass(frozen=True)
-class Box:
-    """A part of the floor where nothing may stand [m]."""
-
-    x0: float
-    x1: float
-    y0: float
-    y1: float
-
-    def holds(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Which points lie in it."""
-        return (x >= self.x0) & (x < self.x1) & (y >= self.y0) & (y < self.y1)
-
-
-def walls(side: float) -> list[Box]:
-    """Around a room of ``side`` [m]."""
-    return [
-        Box(0, side, 0, 0.05),
-        Box(0, side, side - 0.05, side),
-        Box(0, 0.05, 0, side),
-        Box(side - 0.05, side, 0, side),
-    ]
-
-
-WALLS = walls(SIDE)
-
-
-def random_boxes(rng: np.random.Generator, is_open: bool = False, side: float = SIDE) -> list[Box]:
-    """Walls around unless it is open, four to eleven boxes, and up to two walls with a gap of 0.7 to 1.5 m."""
-    boxes = [] if is_open else walls(side)
-    for _ in range(rng.integers(4, 12)):
-        (x, y), (w, h) = rng.uniform(0.0, side, 2), rng.uniform(0.1, 1.0, 2)
-        boxes.append(Box(x, x + w, y, y + h))
-    for _ in range(rng.integers(0, 3)):
-        at, gap = rng.uniform(0.2 * side, 0.8 * side), rng.uniform(0.7, 1.5)
-        begin = rng.uniform(0.0, side - gap)
-        parts = [Box(at, at + 0.1, 0, begin), Box(at, at + 0.1, begin + gap, side)]
-        boxes += parts if rng.random() < 0.5 else [Box(p.y0, p.y1, p.x0, p.x1) for p in parts]
-    return boxes
-
-
 class World(ABC):
     """One floor with its map, and a start and a goal where the robot fits; None as ends if there are none."""
 
     backend: str
     map: Any
     side = SIDE
+    robot: SimulatedRobot
 
-    def __init__(self, seed: int, is_open: bool = False) -> None:
-        self.clock = Clock()
-        rng = np.random.default_rng(seed)
-        self.build(random_boxes(rng, is_open, self.side))
+    def __init__(self, seed: int, is_open: bool = False, robot: SimulatedRobot | None = None) -> None:
+        self.clock, self.robot = Clock(), robot or self.robot
+        self.motion, self.delay = Motion(self.robot), CommandDelay()
+        rng, scale = np.random.default_rng(seed), self.robot.scale
+        boxes = random_boxes(rng, is_open, self.side)
+        self.side *= scale
+        self.build([box.scaled(scale) for box in boxes])
         self.ends = self._ends(rng)
 
     @abstractmethod
@@ -134,16 +99,39 @@ class World(ABC):
         """Index of the first pose of a path at which a controller's check finds a collision; -1 if it fits at all."""
         return next((index for index, pose in enumerate(path) if not self.fits(pose)), -1)
 
-    def moved(self, pose: Pose, command: Any) -> Pose:
-        """Where a robot without inertia is one period later."""
-        turn = (pose.x, pose.y, pose.yaw), command.vx, command.vy, command.wz
-        return self.pose_on(*arc_poses(*turn, PERIOD, PERIOD)[-1].tolist())
+    @abstractmethod
+    def touches(self, poses: FloatArray) -> bool:
+        """Whether the robot touches something at any of poses (n, 3: x, y [m], yaw [rad]), its padding left out."""
+
+    def when_it_acts(self, pose: Pose) -> tuple[Pose, Twist]:
+        """Pose and velocity when a command that is sent now takes effect, as the core predicts them."""
+        return self.delay.ahead(self.clock.time, self.robot.delay, pose, self.motion.velocity)
+
+    def moved(self, pose: Pose, command: Any) -> tuple[Pose, bool]:
+        """Where the robot is one period later, and whether it has touched something by then."""
+        self.delay.note(self.clock.time, command)
+        poses = self.motion.drive(pose, command)
+        self.clock.time += self.robot.period
+        return self.pose_on(*poses[-1].tolist()), self.robot.is_drawn and self.touches(poses)
+
+    def stopped(self, pose: Pose) -> tuple[Pose, bool]:
+        """Where the robot stands after commands of zero, and whether it has touched something by then."""
+        if not self.robot.is_drawn:
+            self.motion.velocity = Twist()
+            self.clock.time += self.robot.period
+            return pose, False
+        for _ in range(math.ceil(LONGEST_STOP / self.robot.period)):
+            pose, touched = self.moved(pose, Twist())
+            if touched or self.motion.velocity == Twist():
+                return pose, touched
+        return pose, False
 
     def _ends(self, rng: np.random.Generator) -> tuple[Pose, Pose] | None:
         found: list[Pose] = []
+        margin = 0.3 * self.robot.scale
         for _ in range(2000):
-            pose = self.pose_on(*rng.uniform(0.3, self.side - 0.3, 2), rng.uniform(-math.pi, math.pi))
-            if self.fits(pose) and not (found and pose.distance_to(found[0]) < 1.5):
+            pose = self.pose_on(*rng.uniform(margin, self.side - margin, 2), rng.uniform(-math.pi, math.pi))
+            if self.fits(pose) and not (found and pose.distance_to(found[0]) < 1.5 * self.robot.scale):
                 found.append(pose)
             if len(found) == 2:
                 return found[0], found[1]
@@ -154,37 +142,50 @@ class CostmapWorld(World):
     """A robot of 1.0 m x 0.5 m on a costmap."""
 
     backend = "costmap"
-    outline = OUTLINE
+    robot = RECTANGLE
     turning_radius = 0.0
 
     def build(self, boxes: list[Box]) -> None:
         """Make the map of a floor with boxes."""
-        centres = (np.arange(round(self.side / RESOLUTION)) + 0.5) * RESOLUTION
+        self.resolution = RESOLUTION * min(self.robot.scale, 1.0)
+        centres = (np.arange(round(self.side / self.resolution)) + 0.5) * self.resolution
         x, y = np.meshgrid(centres, centres)
         cells = np.where(np.any([box.holds(x, y) for box in boxes], axis=0), 254, 0).astype(np.uint8)
         layers = ({"name": "walls", "type": "static"}, {"name": "inflation", "type": "inflation"})
-        parameters = CostmapParameters(resolution=RESOLUTION, footprint=self.outline, max_age=0.0, layers=layers)
-        inflation = {"inflation_radius": 0.8, "cost_scaling_factor": 5.0}
-        self.map = build_layered_costmap(parameters, {"inflation": inflation}, static_map=Costmap(cells, RESOLUTION))
+        footprint = self.robot.footprint
+        outline = [(float(x), float(y)) for x, y in footprint.vertices]
+        parameters = CostmapParameters(resolution=self.resolution, footprint=outline, max_age=0.0, layers=layers)
+        inflation = {"inflation_radius": max(0.8, footprint.inscribed_radius + 0.55), "cost_scaling_factor": 5.0}
+        static_map = Costmap(cells, self.resolution)
+        self.map = build_layered_costmap(parameters, {"inflation": inflation}, static_map=static_map)
         self.map.update(Pose.planar(0.0, 0.0), 0.0)
 
     def plugin(self, kind: PluginKind, name: str) -> Any:
         """Make a plugin on the map, with its defaults."""
         plugin_class = PluginRegistry("costmap").load(kind, name)
         maps = {"local": self.map, "global": self.map}
-        parameters = plugin_class.Parameters(**self.parameters(name))
+        parameters = plugin_class.Parameters(**self.parameters(name, plugin_class))
         common = "dut", parameters, self.clock, np.random.default_rng(0), Robot(), self.map
         limits = {"transforms": TransformBuffer(), "min_turning_radius": self.turning_radius}
         return plugin_class(CostmapContext(*common, maps=maps, **limits))
 
-    def parameters(self, name: str) -> dict[str, Any]:
-        """Parameters of a plugin that are not its defaults: none."""
-        return {}
+    def parameters(self, name: str, plugin_class: Any) -> dict[str, Any]:
+        """Parameters of a plugin that are not its defaults; a shim's inner controller is the default one."""
+        given = self.robot.parameters(plugin_class)
+        if name == "rotation_shim" and self.robot.is_drawn:
+            inner = PluginRegistry("costmap").load(PluginKind.CONTROLLER, plugin_class.Parameters().inner_type)
+            given["inner"] = self.robot.parameters(inner)
+        return given
 
     def first_misfit(self, path: Any) -> int:
         """As for all; here with the samples of the controllers."""
-        check, costmap = FootprintCheck(self.map.footprint, RESOLUTION), self.map.snapshot()
+        check, costmap = FootprintCheck(self.map.footprint, self.resolution), self.map.snapshot()
         return check.first_collision(costmap, np.array([(pose.x, pose.y, pose.yaw) for pose in path]))
+
+    def touches(self, poses: FloatArray) -> bool:
+        """As for all."""
+        check = FootprintCheck(self.map.unpadded_footprint, self.resolution)
+        return check.first_collision(self.map.snapshot(), poses) >= 0
 
     def pose_on(self, x: float, y: float, yaw: float) -> Pose:
         """Pose of a robot that stands on the floor."""
@@ -199,10 +200,10 @@ class CostmapWorld(World):
 class CarWorld(CostmapWorld):
     """A car of the same size, whose ``base_link`` is on its rear axle, in rooms of 9 m."""
 
-    outline = CAR_OUTLINE
+    robot = CAR
     turning_radius, side = TURNING_RADIUS, CAR_SIDE
 
-    def parameters(self, name: str) -> dict[str, Any]:
+    def parameters(self, name: str, plugin_class: Any) -> dict[str, Any]:
         """MPPI has to be told how the robot moves."""
         return {"motion_model": "ackermann"} if name == "mppi" else {}
 
@@ -223,29 +224,38 @@ class MeshWorld(World):
     """A disc of 0.25 m on gentle bumps."""
 
     backend = "mesh"
+    robot = DISC
 
     def build(self, boxes: list[Box]) -> None:
         """Make the map of a floor with boxes."""
-        spacing = 0.1
-        x, y = np.meshgrid(*2 * [np.arange(round(SIDE / spacing) + 1) * spacing])
+        spacing, radius = 0.1 * min(self.robot.scale, 1.0), self.robot.radius
+        x, y = np.meshgrid(*2 * [np.arange(round(self.side / spacing) + 1) * spacing])
         self.map = MeshMap.from_heights(0.05 * np.sin(1.5 * x) * np.cos(1.2 * y), spacing, spacing)
-        self.map.inscribed_radius = RADIUS
+        self.map.inscribed_radius = radius
         common = self.map.topology, self.map.locator
         walls = PaintedLayer(LayerContext("walls", *common, PaintedLayer.Parameters()))
         walls.boxes = boxes
         # As on all shipped maps: with the default 0.99 planners may cross places where the disc does not fit.
         closed = {"lethal_value": np.inf, "inscribed_value": 1.0}
-        inflation = InflationLayer.Parameters(inscribed_radius=RADIUS, inflation_radius=0.6, **closed)
+        inflation = InflationLayer.Parameters(inscribed_radius=radius, inflation_radius=radius + 0.35, **closed)
         shown = InflationLayer(LayerContext("inflation", *common, inflation, (walls,)))
         for layer in (walls, shown):
             layer.recompute()
+        self.walls = walls
         self.map.set_layers(LayerGraph([walls, shown]), "inflation", 1.0)
 
     def plugin(self, kind: PluginKind, name: str) -> Any:
         """Make a plugin on the map, with its defaults."""
         plugin_class = PluginRegistry("mesh").load(kind, name)
-        common = "dut", plugin_class.Parameters(), self.clock, np.random.default_rng(0), Robot(), self.map
+        parameters = plugin_class.Parameters(**self.robot.parameters(plugin_class))
+        common = "dut", parameters, self.clock, np.random.default_rng(0), Robot(), self.map
         return plugin_class(MeshContext(*common, transforms=TransformBuffer()))
+
+    def touches(self, poses: FloatArray) -> bool:
+        """As for all: a lethal vertex is nearer than the radius by half the longest edge; a plan may come so near."""
+        lethal = self.map.topology.vertices[self.walls.lethal, :2]
+        reach = self.robot.radius - 0.5 * float(self.map.neighbour_lengths.max())
+        return bool((np.square(poses[:, None, :2] - lethal).sum(axis=2) < reach**2).any())
 
     def pose_on(self, x: float, y: float, yaw: float) -> Pose:
         """Pose of a robot that stands on the floor, straight below or above (x, y)."""

@@ -161,6 +161,13 @@ class NavigationParameters(ParameterModel):
     command_timeout: float = parameter(
         0.5, "Time after the last command at which the robot is stopped.", unit="s", gt=0.0, le=10.0
     )
+    command_delay: float = parameter(
+        0.0,
+        "Time until a command shows in how the robot moves; controllers are given the pose and velocity of then.",
+        unit="s",
+        ge=0.0,
+        le=1.0,
+    )
     cancel_grace: float = parameter(
         1.0, "Time a plugin has to obey a cancel before it is quarantined.", unit="s", ge=0.0, le=60.0
     )

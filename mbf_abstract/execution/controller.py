@@ -11,6 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TypeVar
 
+from mbf_abstract.drive.command_delay import CommandDelay
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.drive.velocity_gate import Lease
 from mbf_abstract.event_values import error_text
@@ -61,13 +62,11 @@ class ControllerExecution:
         self._take_new_plan = take_new_plan
         self._on_cycle = on_cycle
         self._plan: Plan | None = None
-        self._failures = 0
-        self._cycles = 0
-        self._failed_cycles = 0
+        self._failures = self._cycles = self._failed_cycles = 0
         self.last_result: ControlResult | None = None
         self._motion = MotionWatch(run.runtime)
         self._graceful_stop: Stopwatch | None = None
-        self._stops = StopsAtGoal(run.runtime.clock)
+        self._stops, self._delay = StopsAtGoal(run.runtime.clock), CommandDelay()
         self._lease: Lease | None = None
         self.state = ControllerState.INITIALIZED
 
@@ -142,6 +141,7 @@ class ControllerExecution:
         result = self._compute(pose, measured)
         end = self._judge(result, lease)
         self._on_cycle(pose, result)
+        self._delay.note(self._runtime.clock.now(), self._runtime.gate.last_command)
         return end
 
     def _adopt_new_plan(self) -> ControllerEnd | None:
@@ -254,7 +254,9 @@ class ControllerExecution:
 
     def _compute(self, pose: Pose, measured: Twist | None) -> ControlResult:
         self._enter(ControllerState.CONTROLLING)
-        request = ControlRequest(pose, measured or Twist(), self._run.handle.cancel_token)
+        delay = self._runtime.parameters.command_delay
+        then = self._delay.ahead(self._runtime.clock.now(), delay, pose, measured or Twist())
+        request = ControlRequest(*then, self._run.handle.cancel_token)
         compute = partial(self._controller.compute_velocity_commands, request)
         try:
             result = self._run.ask("compute_velocity_commands", compute, ControlResult)

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from mbf_abstract.geometry import Twist, normalize_angle
+from mbf_abstract.maps.controllers.inertia import PLANNED, braking_distance, speed_on_path, stopping_speed
 from mbf_abstract.maps.controllers.room_to_turn import off_course
 from mbf_costmap_nav.control.path_geometry import look_ahead_point
 from mbf_costmap_nav.control.path_handling import ControlCycle, to_base_frame
@@ -69,9 +70,19 @@ class PursuitSteering(RegulatedFollower):
         p, velocity = self.parameters, cycle.request.velocity
         cost = cycle.costmap.cost_at(cycle.request.pose.x, cycle.request.pose.y) or FREE
         regulated = min(self.regulated_speed(curvature, cost, cycle.tracker.to_cusp), cycle.speed_limit, self._fastest)
+        regulated = min(regulated, self._stopping_speed(cycle))
         wanted = -regulated if backward else regulated
         change = p.acc_lim_x * p.control_period
         speed = min(max(wanted, velocity.vx - change), velocity.vx + change)
         if abs(speed * curvature) > p.max_vel_theta:
             speed = math.copysign(p.max_vel_theta / abs(curvature), speed)
         return Twist.planar(vx=speed, wz=speed * curvature)
+
+    def _stopping_speed(self, cycle: ControlCycle) -> float:
+        """Speed [m/s] from which the robot can brake for the end of its path, and for bends beyond the carrot."""
+        p, speed = self.parameters, cycle.request.velocity.vx
+        stopping = stopping_speed(cycle.tracker.to_cusp, PLANNED * p.acc_lim_x, p.control_period)
+        look_ahead, on_path = self.look_ahead_distance(speed), math.inf
+        if braking_distance(speed, p.acc_lim_x) > look_ahead:
+            on_path = speed_on_path(cycle.tracker, speed, look_ahead, p, p.max_vel_theta)
+        return min(max(stopping, p.min_approach_vel), on_path)

@@ -13,6 +13,7 @@ import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.maps.controllers.end_of_path import swept_poses
+from mbf_abstract.maps.controllers.inertia import braking_distance
 from mbf_abstract.maps.controllers.room_to_turn import CREEPING, SMALL_TURN, angle_to_path
 from mbf_costmap_nav.control.path_handling import ControlCycle
 from mbf_costmap_nav.control.pursuit_steering import PursuitSteering
@@ -21,11 +22,6 @@ SLACK = 1e-9
 """[m/s, steps] What rounding may add."""
 SWEEP_STEP = 0.1
 """[cells] The outline moves so far from pose to pose of a turn on the spot."""
-
-
-def braking_distance(speed: float, deceleration: float) -> float:
-    """Length [m] that a robot rolls until it creeps; 0 for one that creeps or stands."""
-    return max(speed**2 - CREEPING**2, 0.0) / (2.0 * deceleration)
 
 
 def rolled_poses(

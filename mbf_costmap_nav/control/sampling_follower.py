@@ -14,7 +14,9 @@ import numpy as np
 
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.controllers.inertia import PLANNED, stopping_speed
 from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath, MotionLimits, cannot_turn_ahead
+from mbf_abstract.maps.controllers.room_to_turn import CREEPING
 from mbf_abstract.maps.controllers.standing import StandingParameters
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -86,6 +88,8 @@ class SamplingFollower(PathFollower):
             return cycle
         assert self.tracker is not None
         p = self.parameters
+        stopping = stopping_speed(cycle.tracker.to_cusp, PLANNED * p.acc_lim_x), 2.0 * p.acc_lim_x * p.check_ahead_time
+        cycle = replace(cycle, speed_limit=min(cycle.speed_limit, max(min(stopping), CREEPING)))
         around = MovingAround.on(self.navigation_map, cycle.request.pose, self.clock.now(), p.moving_objects)
         pose = self.transforms.transform_pose(request.pose, self.tracker.path.frame_id)
         return self._keeping.choose(

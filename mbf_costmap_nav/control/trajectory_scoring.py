@@ -21,6 +21,8 @@ PATH_SPACING = 0.1
 """Distance [m] of the path points the critics compare with."""
 SMALL = 1e-20
 """A half turn [rad] whose sine is as large as itself."""
+MOST_STEPS = 200
+"""So many steps of a robot that brakes are looked at."""
 
 
 def roll_out(
@@ -124,7 +126,7 @@ def footprint_discs(footprint: Footprint) -> Float32Array:
     return np.linspace(first, last, count).astype(np.float32)
 
 
-def is_free(cycle: ControlCycle, velocities: Float32Array, dt: float) -> bool:
+def is_free(cycle: ControlCycle, velocities: Float32Array | FloatArray, dt: float) -> bool:
     """Whether the full footprint is free of lethal cells while the robot drives velocities (3, steps) of ``dt`` [s].
 
     Along exact arcs in float64: the rollouts end up to 0.03 mm a step beside them, which is enough to touch something.
@@ -132,6 +134,29 @@ def is_free(cycle: ControlCycle, velocities: Float32Array, dt: float) -> bool:
     """
     pose = cycle.request.pose
     return cycle.first_collision(driven_poses((pose.x, pose.y, pose.yaw), velocities.T.astype(np.float64), dt)) < 0
+
+
+def stops_free(
+    cycle: ControlCycle, velocity: FloatArray, braking: FloatArray, dt: float, looked_at: float = 0.0
+) -> bool:
+    """Whether a robot that is stopped after a step of ``dt`` [s] with a velocity touches nothing until it stands.
+
+    Where this holds for every command, no robot whose next motions are all refused rolls into something. One that
+    touches something already has to get out of it, not to stop.
+
+    Parameters
+    ----------
+    velocity, braking : (3,) float64
+        vx, vy, wz [m/s, rad/s], and by how much each is slowed down [m/s^2, rad/s^2].
+    looked_at : float
+        So long ahead [s] its arc is free; one that stands after half of that stops on it, as good as.
+    """
+    stands_after = float(np.max(np.abs(velocity) / braking))
+    if cycle.touches or stands_after <= 0.5 * looked_at:
+        return True
+    steps = min(math.ceil(stands_after / dt) + 1, MOST_STEPS)
+    speeds = np.maximum(np.abs(velocity)[:, None] - (braking * dt)[:, None] * np.arange(steps), 0.0)
+    return is_free(cycle, np.sign(velocity)[:, None] * speeds, dt)
 
 
 def driven_poses(pose: tuple[float, float, float], velocities: FloatArray, dt: float) -> FloatArray:

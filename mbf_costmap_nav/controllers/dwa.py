@@ -25,7 +25,7 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlResult
 from mbf_costmap_nav.control.path_handling import ControlCycle
 from mbf_costmap_nav.control.sampling_follower import SamplingFollower, SamplingParameters
-from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score
+from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score, stops_free
 from mbf_costmap_nav.critics import CriticParameters
 from mbf_costmap_nav.critics.obstacle_critic import COLLISION
 from mbf_costmap_nav.kernels.control.rollout import clip_velocities
@@ -69,7 +69,9 @@ class DWAController(SamplingFollower):
     def parameters_changed(self) -> None:
         """Take over new limits."""
         p = self.parameters
-        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0)
+        self._braking = np.array([p.acc_lim_x, p.acc_lim_y, p.acc_lim_theta])
+        inertia = {"acc_lim_x": p.acc_lim_x, "acc_lim_theta": p.acc_lim_theta, "control_period": p.window_time}
+        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0, **inertia)
 
     def limits(self, cycle: ControlCycle) -> MotionLimits:
         """Those of the window."""
@@ -104,6 +106,9 @@ class DWAController(SamplingFollower):
                 break
             command = Twist.planar(*candidates[sample].tolist())
             is_slowly = is_free(cycle, velocities[:, :checked_steps, sample], p.sim_step)
+            is_slowly = is_slowly and stops_free(
+                cycle, candidates[sample], self._braking, p.sim_step, p.check_ahead_time
+            )
             if is_slowly and self._held_is_free(cycle, command, checked_steps * p.sim_step):
                 return ControlResult(ExePathOutcome.SUCCESS, "", command, hindered_by)
         pose = cycle.request.pose

@@ -34,7 +34,7 @@ from mbf_costmap_nav.control.car_on_path import car_on_path
 from mbf_costmap_nav.control.path_handling import ControlCycle
 from mbf_costmap_nav.control.sampling_follower import SamplingFollower, SamplingParameters
 from mbf_costmap_nav.control.sampling_noise import correlated_noise, smoothing_matrix
-from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score
+from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score, stops_free
 from mbf_costmap_nav.critics import CriticParameters
 from mbf_costmap_nav.critics.obstacle_critic import COLLISION
 from mbf_costmap_nav.kernels.control.rollout import add_noise, blend, clip_velocities, integrate
@@ -115,9 +115,9 @@ class MPPIController(SamplingFollower):
         self._high = np.array([p.max_vel_x, sideways, p.max_vel_theta], dtype=np.float32)
         self._change = np.array([p.acc_lim_x, p.acc_lim_y, p.acc_lim_theta], dtype=np.float32) * np.float32(p.model_dt)
         deviation = [p.vx_std, p.vy_std if p.motion_model == "omni" else 0.0, p.wz_std]
-        self._deviation = np.array(deviation, dtype=np.float32)
-        self._radius = self.turning_radius
-        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0)
+        self._deviation, self._radius = np.array(deviation, dtype=np.float32), self.turning_radius
+        inertia = {"acc_lim_x": p.acc_lim_x, "acc_lim_theta": p.acc_lim_theta, "control_period": p.model_dt}
+        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0, **inertia)
         if self._radius > 0.0:
             names = "max_vel_x", "max_vel_theta", "acc_lim_x", "max_path_distance"
             limits = {"min_turning_radius": self._radius, "allow_reversing": p.min_vel_x < 0.0}
@@ -181,11 +181,9 @@ class MPPIController(SamplingFollower):
 
     def planned_motion(self) -> PlannedMotion | None:
         """Return the nominal sequence; None where it keeps to the path instead."""
-        if self._keeping.is_keeping:
-            return None
-        return PlannedMotion(self._nominal.T.astype(np.float64), self.parameters.model_dt)
+        motion = PlannedMotion(self._nominal.T.astype(np.float64), self.parameters.model_dt)
+        return None if self._keeping.is_keeping else motion
 
-    # -------------------------------------------------------------------------------------------- optimisation
     def _optimise(self, cycle: ControlCycle, around: MovingAround) -> Float32Array | None:
         """Best velocities (3, steps) around the nominal ones, or None if nothing fits."""
         p, velocities = self.parameters, self._velocities
@@ -205,15 +203,22 @@ class MPPIController(SamplingFollower):
         checked_steps = max(1, round(p.check_ahead_time / cycle.limit_factor / p.model_dt))
         best_touches = around.anybody and bool(met.touches[int(np.argmin(costs))])
         is_spoiled = around.anybody and not best_touches and self._meets(controls, cycle, around)
-        if not is_spoiled and is_free(cycle, controls[:, :checked_steps, 0], p.model_dt):
+        if not is_spoiled and self._may_drive(cycle, controls[:, :checked_steps, 0]):
             return np.asarray(controls[:, :, 0])
         ranked = np.argsort(costs, kind="stable")[:FALLBACK_SAMPLES]
         if around.anybody and not best_touches:  # those that lead into somebody come last
             ranked = ranked[np.argsort(met.touches[ranked], kind="stable")]
         for sample in ranked.tolist():
-            if costs[sample] < COLLISION and is_free(cycle, velocities[:, :checked_steps, sample], p.model_dt):
+            if costs[sample] < COLLISION and self._may_drive(cycle, velocities[:, :checked_steps, sample]):
                 return np.ascontiguousarray(velocities[:, :, sample])
         return None
+
+    def _may_drive(self, cycle: ControlCycle, controls: Float32Array) -> bool:
+        """Whether velocities (3, steps) are free, and the first of them can be stopped."""
+        p = self.parameters
+        first, braking = controls[:, 0].astype(np.float64), self._change.astype(np.float64) / p.model_dt
+        stops = stops_free(cycle, first, braking, p.model_dt, p.check_ahead_time)
+        return stops and is_free(cycle, controls, p.model_dt)
 
     def _meets(self, controls: Float32Array, cycle: ControlCycle, around: MovingAround) -> bool:
         """Whether the mean (3, steps, 1) meets somebody; that of passing in front of them and behind them may."""

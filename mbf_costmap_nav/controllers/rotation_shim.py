@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.controllers.inertia import stopping_speed
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult, InnerPlugin, PluginKind
@@ -109,11 +110,16 @@ class RotationShimController(PathFollower):
     def _rotation(self, angle: float, speed: float) -> Twist:
         p = self.parameters
         change = p.acc_lim_theta * p.control_period
-        wanted = math.copysign(min(p.rotate_to_heading_vel, math.sqrt(2.0 * p.acc_lim_theta * abs(angle))), angle)
+        stopping = stopping_speed(abs(angle), p.acc_lim_theta, p.control_period)
+        wanted = math.copysign(min(p.rotate_to_heading_vel, stopping), angle)
         return Twist.planar(wz=min(max(wanted, speed - change), speed + change))
 
     def _sweeps_obstacle(self, cycle: ControlCycle, command: Twist) -> bool:
-        """Whether turning for another half second would touch a lethal cell; then the inner controller takes over."""
-        pose = cycle.request.pose
-        poses = arc_poses((pose.x, pose.y, pose.yaw), 0.0, 0.0, command.wz, 0.5, 0.05)
+        """Whether turning for another half second, or until it has braked, would touch a lethal cell.
+
+        Then the inner controller takes over.
+        """
+        p, pose = self.parameters, cycle.request.pose
+        duration = max(0.5, p.control_period + 0.5 * abs(command.wz) / p.acc_lim_theta)
+        poses = arc_poses((pose.x, pose.y, pose.yaw), 0.0, 0.0, command.wz, duration, 0.05)
         return cycle.first_collision(poses) >= 0

@@ -15,26 +15,28 @@ with noise that partly lasts and partly changes, and a last check that the blend
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import exp, norm
 from mbf_abstract.geometry.polyline import reverse_segments
 from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
 from mbf_abstract.maps.controllers.failures import missed_path, no_motion
+from mbf_abstract.maps.controllers.inertia import PLANNED, InertiaParameters, stopping_speed
 from mbf_abstract.maps.tracking.avoidance import Encounters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent
-from mbf_mesh_nav.kernels.motion.mppi import Critics, SurfacePose, score_rollouts
+from mbf_mesh_nav.kernels.motion.mppi import SurfacePose, score_rollouts
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.positions import position_text, vector_of
-from mbf_mesh_nav.motion.goal_approach import GoalApproach, braking_speed, clamp, tracker_on_surface
+from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, tracker_on_surface
 from mbf_mesh_nav.motion.path_ahead import path_ahead
-from mbf_mesh_nav.motion.sampled_motions import MPPIParameters, SampledMotions, pieces_of_a_step
+from mbf_mesh_nav.motion.sampled_motions import MPPIParameters, SampledMotions, critics, pieces_of_a_step
 from mbf_mesh_nav.motion.surface_follower import SamplingFollower
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.search.final_approach import with_final_approach, with_first_turn
@@ -65,7 +67,8 @@ class MPPIController(SamplingFollower):
     def parameters_changed(self) -> None:
         """Take over new limits."""
         p = self.parameters
-        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0)
+        inertia = {name: getattr(p, name) for name in InertiaParameters.model_fields}
+        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0, **inertia)
 
     @classmethod
     def reach(cls, parameters: MPPIParameters) -> float:
@@ -130,31 +133,31 @@ class MPPIController(SamplingFollower):
         if not self._begun:
             self._begin(spot, pose)
         self._tracker.update(spot.point)
-        limits = self._motions.limits
         missed = missed_path(self._tracker, p.max_path_distance * self.limit_factor)
         if missed and not self._keeping.is_leaving:
             return missed
         if approach.is_only_turning(pose, self._tracker):
-            return self._turn_at_goal(pose, approach)
-        around = MovingAround.on(self.mesh_map, pose, self.clock.now(), p.moving_objects)
-        return self._keeping.choose(request, limits, p.standing, around, lambda: self._sampled(spot, pose, around))
+            return self._turn_at_goal(request, approach)
+        around, limits = MovingAround.on(self.mesh_map, pose, self.clock.now(), p.moving_objects), self._motions.limits
+        return self._keeping.choose(request, limits, p.standing, around, lambda: self._sampled(spot, request, around))
 
-    def _turn_at_goal(self, pose: Pose, approach: GoalApproach) -> ControlResult:
+    def _turn_at_goal(self, request: ControlRequest, approach: GoalApproach) -> ControlResult:
         """Turn to the goal's heading, which a car cannot do."""
-        p, off = self.parameters, heading_error(pose, approach.goal)
+        p, off = self.parameters, heading_error(request.pose, approach.goal)
         self._idle_cycles += p.motion_model == "ackermann"
         if self._idle_cycles > _IDLE_CYCLES:
             message = f"the goal is reached but for {off:.2f} rad of heading, which a car cannot correct there"
             return ControlResult(ExePathOutcome.NO_VALID_CMD, message)
-        turn = clamp(2.0 * off, p.max_vel_theta)
-        return ControlResult(ExePathOutcome.SUCCESS, "", self._motions.command(0.0, turn))
+        turn = p.turn_rate(clamp(2.0 * off, p.max_vel_theta), off)
+        command = p.reachable(Twist.planar(wz=turn), request.velocity) if self.turns_on_the_spot else Twist()
+        return ControlResult(ExePathOutcome.SUCCESS, "", self._motions.command(command.vx, command.wz))
 
-    def _sampled(self, spot: SurfacePoint, pose: Pose, around: MovingAround) -> ControlResult:
+    def _sampled(self, spot: SurfacePoint, request: ControlRequest, around: MovingAround) -> ControlResult:
         """Sample around the last motion, score, blend, check."""
-        motion = self._best_motion(spot, pose, around)
+        motion = self._best_motion(spot, request, around)
         if motion is None:
             text = f"no motion sampled at {position_text(spot.point)} is collision-free and makes progress"
-            return no_motion(self.mesh_map, pose, text)
+            return no_motion(self.mesh_map, request.pose, text)
         self._nominal = np.concatenate([motion[1:], motion[-1:]])
         command = self._motions.command(float(motion[0, 0]), float(motion[0, 1]))
         return ControlResult(ExePathOutcome.SUCCESS, "", command, self._hindered_by)
@@ -166,16 +169,16 @@ class MPPIController(SamplingFollower):
         speed, yaw_rate = np.moveaxis(self._motions.driven(self._nominal), -1, 0)
         return PlannedMotion(np.stack([speed, np.zeros_like(speed), yaw_rate], axis=1), self.parameters.model_dt)
 
-    def _best_motion(self, spot: SurfacePoint, pose: Pose, around: MovingAround) -> FloatArray | None:
+    def _best_motion(self, spot: SurfacePoint, request: ControlRequest, around: MovingAround) -> FloatArray | None:
         """Blend the sampled motions by their scores; (time_steps, 2), or None if no motion makes progress."""
-        max_speed = min(
-            self.parameters.max_vel_x, max(braking_speed(self._tracker.to_cusp, self.parameters.decel_lim_x), 0.1)
-        )
+        p, pose, now = self.parameters, request.pose, request.velocity
+        braking = min(p.decel_lim_x, PLANNED * p.acc_lim_x)
+        max_speed = min(p.max_vel_x, max(stopping_speed(self._tracker.to_cusp, braking, p.reaction_time), 0.1))
         # A robot beside its goal or past it has no path ahead of it, but still a distance to drive.
         end = self._tracker.point_at(self._tracker.next_cusp)
         to_end = float(norm(end - spot.point))
         room = max(self._tracker.to_cusp, to_end)
-        controls = self._motions.sampled(self.rng, self._nominal, max_speed, room, reverses=self._reverses)
+        controls = self._motions.sampled(self.rng, self._nominal, max_speed, room, now, reverses=self._reverses)
         scores, collided, met = self._score(controls, spot, pose, around)
         scores = np.where(collided, scores + _COLLISION_SCORE, scores)
         self._hindered_by = around.hindering(met, scores)
@@ -185,8 +188,11 @@ class MPPIController(SamplingFollower):
         # The mean of two free motions, left and right of an obstacle or of somebody, may hit it.
         best = int(np.argmin(scores))
         _, hits, mean_met = self._score(blended[None], spot, pose, around)
-        if hits[0] or (mean_met.touches[0] and not met.touches[best]):
+        spoiled = hits[0] or (mean_met.touches[0] and not met.touches[best])
+        if spoiled or not self._stops_free(blended[0], spot, pose, around):
             blended = np.asarray(controls[best])
+        if not self._stops_free(blended[0], spot, pose, around):
+            return None
         # Where most motions collide and the best one hardly moves, standing there would last for ever. So it would
         # where none leads nearer, as for a car that has passed its goal; a cycle or two of it are chance. A robot that
         # lets somebody by only waits.
@@ -197,14 +203,16 @@ class MPPIController(SamplingFollower):
         if stands and not self._hindered_by and collided.mean() > 0.5:  # so do those that end before they meet
             self._hindered_by = around.nearest(self.parameters.max_vel_x * len(blended) * self.parameters.model_dt)
         stands = stands and not self._hindered_by
-        has_far_to_go = self._distance_to_goal(pose) > _STANDSTILL + self.parameters.goal_distance
+        assert self._approach is not None
+        has_far_to_go = ground_distance(pose, self._approach.goal) > _STANDSTILL + self.parameters.goal_distance
         self._idle_cycles = self._idle_cycles + 1 if stands and has_far_to_go else 0
         stuck = stands and (collided.mean() > 0.5 or self._idle_cycles > _IDLE_CYCLES)
         return None if stuck or bool(collided.all()) else blended
 
-    def _distance_to_goal(self, pose: Pose) -> float:
-        assert self._approach is not None
-        return ground_distance(pose, self._approach.goal)
+    def _stops_free(self, control: FloatArray, *there: Any) -> bool:
+        """Whether the robot touches nothing until it stands if it is stopped after a step with a control (2,)."""
+        braked = self._motions.braked(control)
+        return braked is None or not self._score(braked[None], *there)[1][0]
 
     def _score(
         self, controls: FloatArray, spot: SurfacePoint, pose: Pose, around: MovingAround
@@ -225,17 +233,10 @@ class MPPIController(SamplingFollower):
             motions,
             p.model_dt / pieces,
             path_ahead(self._tracker, p, self._approach.goal, reverses=self._reverses),
-            self._critics(),
+            critics(p, _STRICTNESS if self._tracker.remaining < self._strict_below else 1.0),
             poses,
         )
         return scores, collided, around.meet(poses, p.model_dt / pieces)
-
-    def _critics(self) -> Critics:
-        """What makes a motion good: how near to its end the path is followed more strictly depends on the approach."""
-        p = self.parameters
-        path_weight = (_STRICTNESS if self._tracker.remaining < self._strict_below else 1.0) * p.path_weight
-        weights = path_weight, p.cost_weight, p.tilt_weight, p.turn_weight, p.goal_weight, p.heading_weight
-        return Critics(np.array(weights), p.roll_limit, p.pitch_limit)
 
     def _blocked(self) -> BoolArray:
         """Vertices (V,) that no curve may pass near."""

@@ -15,20 +15,29 @@ import math
 import numpy as np
 
 from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.geometry.arcs import arc_to, in_robot_frame
+from mbf_abstract.geometry.arcs import arc_to, in_robot_frame, poses_on_arc
+from mbf_abstract.geometry.arithmetic import norm, rotated
 from mbf_abstract.geometry.tangent_plane import heading_error
 from mbf_abstract.maps.controllers.driving_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_path
+from mbf_abstract.maps.controllers.inertia import PLANNED, InertiaParameters, speed_on_path, stopping_speed
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.map.places import FORBIDDEN_COST
-from mbf_mesh_nav.motion.goal_approach import GoalApproach, braking_speed, clamp, tracker_on_surface
+from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, tracker_on_surface
 from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, SurfaceFollower
 
+SHARES = (1.0, 0.5, 0.25)
+"""Shares of the look-ahead that are tried where the arc to a point farther ahead cuts a corner that is not free."""
+ARC_STEP = 0.05
+"""Distance [m] of the places on an arc that are looked at."""
+CLOSELY = 1.0
+"""Time [s] that a robot takes at least to a point nearer than the usual one."""
 
-class PathFollowerParameters(PluginParameters):
+
+class PathFollowerParameters(InertiaParameters):
     """Parameters of ``mesh.path_follower``."""
 
     look_ahead_dist: float = parameter(0.6, "Distance of the pursued point along the path.", unit="m", gt=0.0, le=10.0)
@@ -70,6 +79,7 @@ class PathFollower(LeavesContacts, SurfaceFollower):
 
     Parameters = PathFollowerParameters
     parameters: PathFollowerParameters
+    _measured = Twist()
 
     @classmethod
     def reach(cls, parameters: PathFollowerParameters) -> float:
@@ -92,7 +102,7 @@ class PathFollower(LeavesContacts, SurfaceFollower):
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle: locate, project onto the path, pursue the point ahead."""
-        pose = request.pose
+        pose, self._measured = request.pose, request.velocity
         cycle = self.begin_cycle(pose, self.parameters.max_surface_distance)
         if isinstance(cycle, ControlResult):
             return cycle
@@ -105,8 +115,7 @@ class PathFollower(LeavesContacts, SurfaceFollower):
         if not is_turning and (out := self._drive_out(pose)) is not None:
             return self._command(out.vx, out.wz)
         if is_turning:
-            turn = self.parameters.turn_gain * heading_error(pose, approach.goal)
-            return self._command(0.0, turn)
+            return self._command(0.0, self._turn(heading_error(pose, approach.goal)).wz)
         if obstacle := self._obstacle_on_path(surface.point):
             return blocked_path(self.mesh_map, pose, obstacle)
         slope = math.acos(clamp(float(self.mesh_map.face_normals[surface.face, 2]), 1.0))
@@ -127,20 +136,23 @@ class PathFollower(LeavesContacts, SurfaceFollower):
         return self.leaving.command(self.mesh_map, pose, bearing, self._turn, gears, on_path)
 
     def _turn(self, angle: float) -> Twist:
-        return Twist.planar(wz=self.parameters.turn_gain * angle)
+        return Twist.planar(wz=self.parameters.turn_rate(self.parameters.turn_gain * angle, angle))
 
-    def _target(self) -> FloatArray:
-        """The pursued point (3,) [m]."""
-        tracker, ahead = self._tracker, self.parameters.look_ahead_dist
+    def _target(self, share: float = 1.0) -> FloatArray:
+        """The pursued point (3,) [m], or one at a share of its distance."""
+        tracker, ahead = self._tracker, share * self.parameters.look_ahead_dist
         return tracker.point_at(tracker.progress + ahead) if tracker.on_last_section else tracker.straight_on(ahead)
 
     def _pursue(self, pose: Pose, slope: float) -> ControlResult:
         """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""
-        p = self.parameters
-        tracker, target = self._tracker, self._target()
-        bearing, curvature = arc_to(pose, target)
-        if abs(bearing) > p.rotate_to_heading_min_angle:
-            return self._command(0.0, p.turn_gain * bearing)
+        p, tracker = self.parameters, self._tracker
+        for share in SHARES:
+            target = self._target(share)
+            bearing, curvature = arc_to(pose, target)
+            if abs(bearing) > p.rotate_to_heading_min_angle:
+                return self._command(0.0, self._turn(bearing).wz)
+            if share == SHARES[-1] or self._is_free(pose, target, bearing, curvature):
+                break
         slope_factor = 1.0 - (1.0 - p.slope_speed_factor) * min(slope / p.slow_slope, 1.0)
         # A robot that ran past the goal has no path left, but still a distance to drive back; the height of its frame
         # above the surface does not count.
@@ -151,11 +163,30 @@ class PathFollower(LeavesContacts, SurfaceFollower):
             p.max_vel_x * slope_factor,
             math.sqrt(p.max_lateral_acceleration / max(abs(curvature), 1e-6)),
             p.max_vel_theta / max(abs(curvature), 1e-6),
-            braking_speed(left, p.decel_lim_x),
+            stopping_speed(left, min(p.decel_lim_x, PLANNED * p.acc_lim_x), p.reaction_time),
+            speed_on_path(tracker, self._measured.vx, p.look_ahead_dist, p, p.max_vel_theta),
+            share * p.look_ahead_dist / CLOSELY if share < 1.0 else math.inf,
         )
         speed = max(speed, min(p.min_speed, p.max_vel_theta / max(abs(curvature), 1e-6)))
         return self._command(speed, speed * curvature)
 
+    def _is_free(self, pose: Pose, target: FloatArray, bearing: float, curvature: float) -> bool:
+        """Whether the map allows all of the arc to a target, which cuts the corners of the path.
+
+        It is asked for robots that state their inertia; others drive as before, bit for bit.
+        """
+        p = self.parameters
+        if p.check_ahead_dist == 0.0 or p.acc_lim_x == math.inf:
+            return True
+        length = float(norm(target - np.asarray(pose.position)))
+        length *= bearing / math.sin(bearing) if bearing != 0.0 else 1.0
+        times = np.linspace(0.0, length, max(math.ceil(length / ARC_STEP), 1) + 1)[1:]
+        local = np.zeros((len(times) + 1, 3))
+        local[1:, :2] = poses_on_arc((0.0, 0.0, 0.0), 1.0, 0.0, curvature, times)[:, :2]
+        places = rotated(pose.rotation, local) + np.asarray(pose.position)
+        return not self.obstacle_along(places, p.max_surface_distance, p.cost_limit)
+
     def _command(self, speed: float, turn: float) -> ControlResult:
-        turn = clamp(turn, self.parameters.max_vel_theta)
-        return ControlResult(ExePathOutcome.SUCCESS, "", Twist.planar(vx=speed, wz=turn))
+        p = self.parameters
+        command = Twist.planar(vx=speed, wz=clamp(turn, p.max_vel_theta))
+        return ControlResult(ExePathOutcome.SUCCESS, "", p.reachable(command, self._measured, p.max_vel_theta))

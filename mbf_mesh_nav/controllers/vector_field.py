@@ -19,8 +19,9 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm, rotated_back
 from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
 from mbf_abstract.maps.controllers.failures import blocked_path
+from mbf_abstract.maps.controllers.inertia import PLANNED, InertiaParameters, speed_before_bends, stopping_speed
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.mesh.locate import SurfacePoint
@@ -34,7 +35,7 @@ STRAYING = 2.0
 NO_FIELD = "it brings no vector field along; plans of mesh.cvp do, as long as nothing refines or copies them"
 
 
-class VectorFieldParameters(PluginParameters):
+class VectorFieldParameters(InertiaParameters):
     """Parameters of ``mesh.vector_field``."""
 
     max_vel_x: float = parameter(1.0, "Forward speed limit.", unit="m/s", gt=0.0, le=5.0)
@@ -71,6 +72,7 @@ class VectorFieldController(SurfaceFollower):
     parameters: VectorFieldParameters
 
     _face = -1
+    _measured = Twist()
 
     @property
     def turns_on_the_spot(self) -> bool:
@@ -94,7 +96,7 @@ class VectorFieldController(SurfaceFollower):
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle: locate, look up the direction, apply the law."""
-        pose = request.pose
+        pose, self._measured = request.pose, request.velocity
         cycle = self.begin_cycle(pose, self.parameters.max_surface_distance, self._face)
         if isinstance(cycle, ControlResult):
             return cycle
@@ -106,10 +108,13 @@ class VectorFieldController(SurfaceFollower):
         direction = self._fields[self._leg].direction_at(self.mesh_map, spot)
         if direction is None:
             return ControlResult(ExePathOutcome.MISSED_PATH, "the vector field does not lead on from here")
-        if obstacle := self._obstacle_on_field(spot):
+        p, places = self.parameters, self._places_ahead(spot)
+        if obstacle := self.obstacle_along(places, p.max_surface_distance, p.cost_limit):
             return blocked_path(self.mesh_map, pose, obstacle)
         ahead = rotated_back(pose.rotation, direction)
-        return self._steer(math.atan2(ahead[1], ahead[0]), ground_distance(pose, approach.goal))
+        is_slow = p.acc_lim_x < math.inf
+        fastest = speed_before_bends(places[:, :2], OBSTACLE_STEP, p, p.max_vel_theta) if is_slow else math.inf
+        return self._steer(math.atan2(ahead[1], ahead[0]), ground_distance(pose, approach.goal), fastest)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the last leg has been driven to its end, and the last pose of the plan is reached."""
@@ -134,8 +139,8 @@ class VectorFieldController(SurfaceFollower):
         else:
             self._leg += bool(norm(self._fields[self._leg].goal - point) <= self.parameters.via_distance)
 
-    def _obstacle_on_field(self, spot: SurfacePoint) -> str:
-        """The first place that the map forbids now where the field leads from here, as a text; empty without one."""
+    def _places_ahead(self, spot: SurfacePoint) -> FloatArray:
+        """Places (n, 3) [m] where the field leads from here, ``OBSTACLE_STEP`` apart."""
         p, field, places = self.parameters, self._fields[self._leg], [spot.point]
         there: SurfacePoint | None = spot
         for _ in range(math.ceil(p.check_ahead_dist / self.limit_factor / OBSTACLE_STEP)):
@@ -144,21 +149,26 @@ class VectorFieldController(SurfaceFollower):
                 break
             places.append(there.point + OBSTACLE_STEP / float(norm(direction)) * direction)
             there = self.mesh_map.locate_one(places[-1], p.max_surface_distance, there.face)
-        return self.obstacle_along(np.array(places), p.max_surface_distance, p.cost_limit)
+        return np.array(places)
 
-    def _steer(self, error: float, distance_to_goal: float) -> ControlResult:
-        """Apply the law to a heading error [rad, left positive] and the distance [m] left to the goal."""
+    def _steer(self, error: float, distance_to_goal: float, fastest: float) -> ControlResult:
+        """Apply the law to a heading error [rad, left positive], within ``fastest`` [m/s], ``distance_to_goal`` [m]."""
         p = self.parameters
         if abs(error) > p.rotate_to_heading_min_angle:
             return self._command(0.0, self._turn_rate(error))
         speed = p.max_vel_x * (1.0 - abs(error) / p.rotate_to_heading_min_angle) * p.lin_vel_factor
         fading = min(1.0, distance_to_goal / p.arrival_fading) if self._on_last_leg else 1.0
-        faded = max(p.max_vel_x * fading, p.min_speed)
+        seen = p.check_ahead_dist or math.inf
+        seen = min(distance_to_goal, seen) if self._on_last_leg else seen
+        stopping = stopping_speed(seen, PLANNED * p.acc_lim_x, p.reaction_time)
+        faded = max(min(p.max_vel_x * fading, stopping, fastest), p.min_speed)
         return self._command(min(speed, faded, p.max_vel_x), self._turn_rate(error))
 
     def _turn_rate(self, error: float) -> float:
-        return error * self.parameters.max_vel_theta / math.pi * self.parameters.ang_vel_factor
+        p = self.parameters
+        return p.turn_rate(error * p.max_vel_theta / math.pi * p.ang_vel_factor, error)
 
     def _command(self, speed: float, turn: float) -> ControlResult:
-        turn = clamp(turn, self.parameters.max_vel_theta)
-        return ControlResult(ExePathOutcome.SUCCESS, "", Twist.planar(vx=speed, wz=turn))
+        p = self.parameters
+        command = Twist.planar(vx=speed, wz=clamp(turn, p.max_vel_theta))
+        return ControlResult(ExePathOutcome.SUCCESS, "", p.reachable(command, self._measured, p.max_vel_theta))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -70,8 +69,3 @@ class GoalApproach:
 def clamp(value: float, limit: float) -> float:
     """Limit a value symmetrically to [-limit, limit]."""
     return max(-limit, min(limit, value))
-
-
-def braking_speed(distance: float, deceleration: float) -> float:
-    """Speed [m/s] from which a constant ``deceleration`` [m/s^2] stops the robot after ``distance`` [m]."""
-    return math.sqrt(2.0 * deceleration * max(distance, 0.0))

@@ -10,11 +10,13 @@ import numpy as np
 
 from mbf_abstract.geometry import AckermannCommand, Command, Twist
 from mbf_abstract.geometry.arithmetic import tan
+from mbf_abstract.maps.controllers.inertia import InertiaParameters
 from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
 from mbf_abstract.maps.controllers.standing import StandingParameters
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters
-from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.kernels.motion.mppi import Critics
 from mbf_mesh_nav.map.places import FORBIDDEN_COST
 from mbf_mesh_nav.motion.goal_approach import clamp
 
@@ -23,7 +25,7 @@ _NOISE_HOLD = 3  # steps a noise value is kept for: explores further than indepe
 USUAL_WHEELBASE = 0.5  # [m] of a car that states none; it only scales the angles
 
 
-class MPPIParameters(PluginParameters):
+class MPPIParameters(InertiaParameters):
     """Parameters of ``mesh.mppi``."""
 
     motion_model: Literal["differential", "ackermann"] = parameter("differential", "How the robot moves.")
@@ -103,10 +105,18 @@ class SampledMotions:
         return self.wheelbase / math.tan(self.steering_limit)
 
     def sampled(
-        self, rng: np.random.Generator, nominal: FloatArray, max_speed: float, remaining: float, *, reverses: bool
+        self,
+        rng: np.random.Generator,
+        nominal: FloatArray,
+        max_speed: float,
+        remaining: float,
+        measured: Twist,
+        *,
+        reverses: bool,
     ) -> FloatArray:
         """Controls (batch_size, time_steps, 2) around ``nominal``; the first are those, the second stand still.
 
+        None changes faster than a robot can that is ``measured`` to move so.
         No robot that can turn where it stands goes on past the goal, ``remaining`` [m] away: motions that run beyond it
         would speak for creeping there.
         """
@@ -127,7 +137,28 @@ class SampledMotions:
             np.minimum(controls[..., 0], room, out=controls[..., 0])
         turn_limit = p.max_vel_theta if p.motion_model == "differential" else self.steering_limit
         np.clip(controls[..., 1], -turn_limit, turn_limit, out=controls[..., 1])
+        self._limit_changes(controls, measured)
         return np.asarray(controls)
+
+    def braked(self, control: FloatArray) -> FloatArray | None:
+        """Controls (time_steps, 2) of a robot that is stopped after a step with ``control`` (2,); None = at once."""
+        p = self.parameters
+        if p.acc_lim_x == math.inf:
+            return None
+        changes = p.model_dt * np.array([p.acc_lim_x, p.acc_lim_theta])
+        speeds = np.maximum(np.abs(control) - changes * np.arange(p.time_steps)[:, None], 0.0)
+        return np.asarray(np.sign(control) * speeds)
+
+    def _limit_changes(self, controls: FloatArray, measured: Twist) -> None:
+        """Let controls (n, time_steps, 2) change from step to step as the robot can; steering angles at once."""
+        p = self.parameters
+        turning = p.acc_lim_theta if p.motion_model == "differential" else math.inf
+        for component, acceleration, now in ((0, p.acc_lim_x, measured.vx), (1, turning, measured.wz)):
+            if acceleration < math.inf:
+                last, change = np.full(len(controls), now), acceleration * p.model_dt
+                for step in controls[..., component].T:
+                    np.clip(step, last - change, last + change, out=step)
+                    last = step
 
     def driven(self, controls: FloatArray) -> FloatArray:
         """Speeds and yaw rates (..., 2) that controls (..., 2) lead to."""
@@ -154,3 +185,10 @@ def pieces_of_a_step(p: MPPIParameters, shortest_edge: float) -> int:
     """
     stride = max(p.max_vel_x, -p.min_vel_x) * p.model_dt
     return math.ceil(stride / max(0.5 * shortest_edge, _LEAST_STRIDE))
+
+
+def critics(p: MPPIParameters, strictness: float) -> Critics:
+    """What makes a motion good; before a bent end the path is followed so many times more strictly."""
+    path_weight = strictness * p.path_weight
+    weights = path_weight, p.cost_weight, p.tilt_weight, p.turn_weight, p.goal_weight, p.heading_weight
+    return Critics(np.array(weights), p.roll_limit, p.pitch_limit)

@@ -20,7 +20,8 @@ SPEC = spec_from_file_location("agreement", SOURCE)
 agreement = sys.modules["agreement"] = module_from_spec(SPEC)
 sys.path.insert(0, str(SOURCE.parent))  # it imports its worlds
 SPEC.loader.exec_module(agreement)
-worlds = sys.modules["agreement_worlds"]
+rooms = sys.modules["agreement_rooms"]
+robots = sys.modules["agreement_robots"]
 sys.path.remove(str(SOURCE.parent))
 
 PURSUIT = "regulated_pure_pursuit"
@@ -57,6 +58,14 @@ STOOD = (
     ("mesh", "dijkstra", "mppi", 65), ("mesh", "dijkstra", "mppi", 67), ("mesh", "any_angle", "mppi", 323),
 )  # fmt: skip
 """Drives with sampled motions that stood before their goal until their time was over, crept, or touched something."""
+OTHER_ROBOTS = (
+    ("costmap", "dijkstra", "mppi", 2004), ("costmap", "astar", "regulated_pure_pursuit", 2007),
+    ("costmap", "theta_star", "follow_path", 2008), ("costmap", "dijkstra", "follow_path", 2010),
+    ("costmap", "astar", "dwa", 2010), ("costmap", "straight_line", "dwa", 2018),
+    ("mesh", "cvp", "vector_field", 2007), ("mesh", "repairing", "path_follower", 2007),
+    ("mesh", "heading_astar", "mppi", 2007), ("mesh", "cvp", "follow_path", 2018),
+)  # fmt: skip
+"""Robots with other outlines, inertia, rates of control and delays that touched something."""
 THROUGH_GAPS = [
     *((name, width) for name in ("dwa", "mppi", "rotation_shim", "follow_path") for width in (0.55, 0.6)),
     *(("regulated_pure_pursuit", width) for width in (0.55, 0.6)),
@@ -128,6 +137,15 @@ def test_a_robot_that_plans_anew_twice_a_second_arrives(controller, seed):
     assert verdict.ending == "arrived", verdict
 
 
+@pytest.mark.parametrize(("backend", "planner", "controller", "seed"), OTHER_ROBOTS)
+def test_a_robot_with_another_outline_and_inertia_arrives_and_touches_nothing(backend, planner, controller, seed):
+    robot = robots.drawn_robot(seed, is_disc=backend == "mesh")
+    world = agreement.WORLDS[backend](seed, False, robot)
+    made = world.plugin(PluginKind.PLANNER, planner), world.plugin(PluginKind.CONTROLLER, controller)
+    verdict = agreement.drive(world, *made)
+    assert verdict.ending == "arrived", verdict
+
+
 class OnePlan:
     """A planner that knows one path, and only once."""
 
@@ -159,7 +177,7 @@ def test_a_car_arrives_in_a_tight_room(seed):
 
 def test_a_car_that_has_passed_its_goal_with_another_heading_asks_for_a_new_plan():
     world = agreement.WORLDS["car"](4)
-    world.build(worlds.walls(world.side))
+    world.build(rooms.walls(world.side))
     path = RobotPath.from_poses([world.pose_on(3.0 + 0.1 * k, 4.0, 0.0) for k in range(10)])
     controller = world.plugin(PluginKind.CONTROLLER, PURSUIT)
     assert controller.set_plan(path)
@@ -174,8 +192,8 @@ def test_a_car_that_has_passed_its_goal_with_another_heading_asks_for_a_new_plan
 @pytest.mark.parametrize(("controller", "width"), THROUGH_GAPS)
 def test_a_gap_hardly_wider_than_the_robot_is_driven_through_at_once(controller, width):
     world, left, mouth = agreement.WORLDS["costmap"](0), 2.75, 4.3
-    sides = worlds.Box(0.0, left, 2.5, mouth), worlds.Box(left + width, worlds.SIDE, 2.5, mouth)
-    world.build([*worlds.WALLS, *sides])
+    sides = rooms.Box(0.0, left, 2.5, mouth), rooms.Box(left + width, rooms.SIDE, 2.5, mouth)
+    world.build([*rooms.WALLS, *sides])
     path = bend_into_a_gap(world, left + 0.5 * width, mouth)
     world.ends = path[0], path[len(path) - 1]
     verdict = agreement.drive(world, OnePlan(path), world.plugin(PluginKind.CONTROLLER, controller))
@@ -184,7 +202,7 @@ def test_a_gap_hardly_wider_than_the_robot_is_driven_through_at_once(controller,
 
 @pytest.mark.parametrize(("backend", "controller"), SAMPLING)
 def test_a_robot_that_no_motion_gets_on_stands_for_a_stated_time_then_says_where(backend, controller):
-    walls, wall = worlds.WALLS, worlds.Box(3.0, 3.2, 0.0, worlds.SIDE)
+    walls, wall = rooms.WALLS, rooms.Box(3.0, 3.2, 0.0, rooms.SIDE)
     world = agreement.WORLDS[backend](0)
     world.build([*walls])
     start, goal = world.pose_on(1.5, 3.0, 0.0), world.pose_on(4.5, 3.0, 0.0)
@@ -194,15 +212,13 @@ def test_a_robot_that_no_motion_gets_on_stands_for_a_stated_time_then_says_where
     assert driver.set_plan(plan.path)
     track, result = [start], None
     while (result is None or result.success) and world.clock.time < 60.0:
-        velocity = result.command if result else Twist()
         driver.is_goal_reached(track[-1], 0.1, 0.2)
-        result = driver.compute_velocity_commands(ControlRequest(track[-1], velocity))
-        world.clock.time += agreement.PERIOD
-        track.append(world.moved(track[-1], result.command or Twist()))
+        result = driver.compute_velocity_commands(ControlRequest(track[-1], world.motion.velocity))
+        track.append(world.moved(track[-1], result.command or Twist())[0])
         assert world.fits(track[-1])
     assert result.outcome == ExePathOutcome.NO_VALID_CMD, result
     x, y = map(float, re.search(r"\((-?[0-9.]+), (-?[0-9.]+)", result.message).groups())
     assert track[-1].distance_to(Pose.planar(x, y, 0.0, track[-1].z)) < 0.1, result.message
     came = next(k for k, pose in enumerate(track) if pose.distance_to(track[-1]) < 0.1)
     # It may creep by as much as once counts as getting on, before it stands for good.
-    assert (len(track) - came) * agreement.PERIOD < 12.0
+    assert (len(track) - came) * world.robot.period < 12.0

@@ -10,17 +10,15 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
-import numpy as np
-
 from mbf_abstract.execution.path_tracker import CUSP_REACHED, PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.controllers.continued_path import carried_over
 from mbf_abstract.maps.controllers.driving_out import Gears, LeavesContacts, OnPath
-from mbf_abstract.maps.controllers.end_of_path import at_exact_end, turn_left
+from mbf_abstract.maps.controllers.end_of_path import at_exact_end
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_path, no_path, outside_map, storeys_off
 from mbf_abstract.maps.controllers.follow_path_parameters import FollowPathParameters
+from mbf_abstract.maps.controllers.inertia import PLANNED, braking_distance, speed_on_path, stopping_speed
 from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
@@ -32,20 +30,27 @@ from mbf_abstract.maps.controllers.room_to_turn import (
     poses_ahead,
     wider_curves,
 )
-from mbf_abstract.maps.controllers.tight_places import CLOSE_FROM, CLOSELY, TightPlaces, outline_fits
-from mbf_abstract.maps.controllers.turn_at_goal import TurnAtGoal, from_goal
-from mbf_abstract.maps.map_plugin import MapPlugin
+from mbf_abstract.maps.controllers.steering_to_path import AT_END, SteeringToPath
+from mbf_abstract.maps.controllers.tight_places import (
+    CLOSE_FROM,
+    CLOSELY,
+    KEPT,
+    REACH,
+    SPACING,
+    TightPlaces,
+    outline_fits,
+    speed_before,
+)
+from mbf_abstract.maps.controllers.turn_at_goal import TurnAtGoal
 from mbf_abstract.maps.queries import AS_CONFIGURED, PADDED, CellState
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
 
 MIN_SPEED = 0.05  # m/s; below it a robot would not reach the end of its path
-AT_END = 0.05  # m; nearer to the goal a robot only turns to its heading, unless the goal's tolerance is less
-SHORTEST_CHECK = 0.05  # s
 
 
-class FollowPath(LeavesContacts, MapPlugin, AbstractController):
+class FollowPath(LeavesContacts, SteeringToPath, AbstractController):
     """Steers along the arc to a point ahead on the path."""
 
     Parameters: ClassVar[type[PluginParameters]] = FollowPathParameters
@@ -54,7 +59,6 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
     _tracker: PathTracker | None = None
     _room_to_turn = RoomToTurn()
     _tight_places = TightPlaces()
-    _turn_at_goal = TurnAtGoal(AT_END)
     _dist_tolerance = 0.0
     ended_early = False
     """Whether the path led no nearer to its goal than the robot has come."""
@@ -69,12 +73,16 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
         """Length [m] left along the path; inf without one."""
         return self._tracker.remaining if self._tracker else math.inf
 
-    def to_tight_place(self, pose: Pose) -> float:
-        """Length [m] that a robot at ``pose``, in the frame of the path, has to a tight place, see ``TightPlaces``."""
+    def to_tight_place(self, pose: Pose, speed: float = 0.0) -> float:
+        """Length [m] that a robot at ``pose``, in the frame of the path, has to a tight place, see ``TightPlaces``.
+
+        One with a ``speed`` [m/s] looks as far as it needs to brake before that.
+        """
         if self._tracker is None:
             return math.inf
-        fits = outline_fits(self, pose, PADDED)
-        return self._tight_places.distance(self._tracker, self.parameters.allow_reversing, fits)
+        fits, p = outline_fits(self, pose, PADDED), self.parameters
+        reach = max(REACH, CLOSE_FROM + braking_distance(speed, p.acc_lim_x) + KEPT + 2.0 * SPACING)
+        return self._tight_places.distance(self._tracker, p.allow_reversing, fits, reach)
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path that has poses."""
@@ -88,6 +96,7 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
         p, pose, tracker = self.parameters, request.pose, self._tracker
         if tracker is None:
             return no_path()
+        self._measured = request.velocity
         tracker.update((pose.x, pose.y))
         self._update_end(pose, tracker)
         farthest = p.max_path_distance * self.relaxation.slack(self.clock.now()).controller_factor
@@ -107,7 +116,7 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
             if self.navigation_map.point_check()(there).state is CellState.OUTSIDE:
                 return outside_map(f"({there.x:.2f}, {there.y:.2f})")
             if (out := self.drive_out(pose)) is not None:
-                return ControlResult(ExePathOutcome.SUCCESS, "", out)
+                return ControlResult(ExePathOutcome.SUCCESS, "", self._reachable(out))
             motions, along = self._motions(pose, tracker), lambda: self._along_path(pose, tracker, p.look_ahead_dist)
             command, obstacle = self._room_to_turn.choose(
                 pose, tracker.progress, motions, p.make_room_dist, blocked, along
@@ -143,7 +152,11 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
 
     def _motions(self, pose: Pose, tracker: PathTracker) -> list[Twist]:
         """A turn at a large heading error, or at the goal to its heading, else an arc; then what makes room for it."""
-        p = self.parameters
+        return [self._reachable(motion) for motion in self._wanted(pose, tracker)]
+
+    def _wanted(self, pose: Pose, tracker: PathTracker) -> list[Twist]:
+        """The same for a robot that follows at once."""
+        p, rolls_on = self.parameters, self._rolls_on
         backward = self._backward(tracker)
         gap, turn = self._from_goal(pose, tracker)
         if self._turn_at_goal.is_turning:
@@ -151,7 +164,8 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
         bearing, curvature = self._carrot(pose, tracker)
         error = off_course(bearing, backward)
         tracker.cusp_reached = CUSP_REACHED
-        if self.to_tight_place(pose) <= CLOSE_FROM and (close := closely_along_path(tracker, pose, backward)):
+        to_tight = self.to_tight_place(pose, self._measured.vx)
+        if to_tight <= CLOSE_FROM and (close := closely_along_path(tracker, pose, backward, rolls_on)):
             tracker.cusp_reached = CLOSELY
             return close
         if self._tight_places.is_close(tracker):
@@ -159,33 +173,16 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
         if abs(error) > p.rotate_to_heading_min_angle:
             return curves_ahead(self._turn(error), error, backward)
         left = max(tracker.to_cusp, gap if tracker.on_last_section else 0.0)
-        speed = min(p.max_vel_x, p.max_vel_theta / max(abs(curvature), 1e-6), math.sqrt(2.0 * p.decel_lim_x * left))
+        until_turn_ends = p.acc_lim_theta / max(abs(curvature), 1e-6)
+        braking = min(p.decel_lim_x, PLANNED * p.acc_lim_x, until_turn_ends)
+        stopping = stopping_speed(left, braking, p.reaction_time)
+        on_path = speed_on_path(tracker, self._measured.vx, p.look_ahead_dist, p, p.max_vel_theta)
+        speed = min(p.max_vel_x, p.max_vel_theta / max(abs(curvature), 1e-6), stopping, on_path)
+        if p.acc_lim_x < math.inf:
+            speed = min(speed, speed_before(to_tight, p.acc_lim_x))
         speed = max(speed, min(MIN_SPEED, p.max_vel_x)) * (-1.0 if backward else 1.0)
         turn = max(-p.max_vel_theta, min(speed * curvature, p.max_vel_theta))
         return wider_curves(Twist.planar(vx=speed, wz=turn))
-
-    def _time_checked(self, motion: Twist, pose: Pose, tracker: PathTracker) -> float:
-        """How long [s] a motion must be free: until it ends at a cusp or has turned far enough, at most as set.
-
-        Of a turn to the goal's heading the whole sweep must be: where it is blocked later, no way is left to drive on.
-        """
-        left, speed = min(tracker.to_cusp, self._arc_to_goal(pose, tracker)), abs(motion.vx)
-        if motion.vx == 0.0 != motion.wz and self._turn_at_goal.is_turning:
-            return max(turn_left(self._from_goal(pose, tracker)[1], motion) / abs(motion.wz), SHORTEST_CHECK)
-        if motion.vx == 0.0:
-            left, speed = abs(self._angle_left(pose, tracker)), abs(motion.wz)
-        longest = self.parameters.check_ahead_time
-        return max(min(longest, left / speed), SHORTEST_CHECK) if speed > 0.0 else longest
-
-    def _arc_to_goal(self, pose: Pose, tracker: PathTracker) -> float:
-        """Length [m] of the arc to the goal where that is the point ahead; it cuts what the path still goes around."""
-        if not tracker.on_last_section or tracker.remaining > self.parameters.look_ahead_dist:
-            return math.inf
-        angle = abs(off_course(self._carrot(pose, tracker)[0], self._backward(tracker)))
-        if angle >= 0.5 * math.pi:
-            return math.inf
-        gap = self._from_goal(pose, tracker)[0]
-        return gap * angle / math.sin(angle) if angle > 0.0 else gap
 
     def _along_path(self, pose: Pose, tracker: PathTracker, reach: float) -> list[Twist]:
         """Motions that keep to the path, if the outline fits on it over ``reach`` [m].
@@ -198,7 +195,9 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
         if not all(fits(*one) for one in poses_ahead(tracker, reach, backward).tolist()):
             return []
         error = angle_to_path(tracker, pose, backward)
-        return [*along_path(tracker, pose, backward), *([self._turn(error)] if abs(error) > SMALL_TURN else [])]
+        motions = along_path(tracker, pose, backward, rolls_on=self._rolls_on)
+        motions += [self._turn(error)] if abs(error) > SMALL_TURN else []
+        return [self._reachable(motion) for motion in motions]
 
     def _stays_on_map(self, pose: Pose, tracker: PathTracker) -> bool:
         """Whether the path does not leave the map as far ahead as it is looked at."""
@@ -225,26 +224,3 @@ class FollowPath(LeavesContacts, MapPlugin, AbstractController):
         self.ended_early = True
         self._turn_at_goal.begin_within(self._dist_tolerance)
         return True
-
-    def _angle_left(self, pose: Pose, tracker: PathTracker) -> float:
-        """Angle [rad] to the goal's heading at the end of the path, else to the point ahead on it."""
-        if self._turn_at_goal.is_turning:
-            return self._from_goal(pose, tracker)[1]
-        return off_course(self._carrot(pose, tracker)[0], self._backward(tracker))
-
-    def _carrot(self, pose: Pose, tracker: PathTracker) -> tuple[float, float]:
-        """Bearing [rad] of the point ahead on the path, and curvature [1/m] of the arc to it."""
-        last, ahead = tracker.on_last_section, self.parameters.look_ahead_dist
-        x, y = (tracker.point_at(tracker.progress + ahead) if last else tracker.straight_on(ahead)).tolist()
-        return arc_to(pose, np.array([x, y, pose.z]))
-
-    def _backward(self, tracker: PathTracker) -> bool:
-        return self.parameters.allow_reversing and tracker.driving_backward
-
-    def _turn(self, angle: float) -> Twist:
-        limit = self.parameters.max_vel_theta
-        return Twist.planar(wz=max(-limit, min(self.parameters.turn_gain * angle, limit)))
-
-    def _from_goal(self, pose: Pose, tracker: PathTracker) -> tuple[float, float]:
-        """Distance [m] and angle [rad] from the pose to the last one of the path."""
-        return from_goal(pose, tracker.goal, self.navigation_map.same_storey)

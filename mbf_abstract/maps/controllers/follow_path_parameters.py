@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
-from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.maps.controllers.inertia import InertiaParameters
+from mbf_abstract.parameters import parameter
 
 
-class FollowPathParameters(PluginParameters):
+class FollowPathParameters(InertiaParameters):
     """Parameters of ``follow_path``."""
 
     max_vel_x: float = parameter(0.5, "Speed on a straight path.", unit="m/s", gt=0.0, le=20.0)

@@ -104,13 +104,14 @@ class KeepingToPath:
         """Whether the robot is leaving a contact."""
         return self._follower.is_leaving
 
-    def drive_with(self, max_vel_x: float, max_vel_theta: float, *, allow_reversing: bool) -> None:
-        """Take over the limits [m/s, rad/s] of the controller."""
+    def drive_with(self, max_vel_x: float, max_vel_theta: float, *, allow_reversing: bool, **inertia: float) -> None:
+        """Take over the limits [m/s, rad/s] of the controller, and ``InertiaParameters`` of the robot."""
         self._follower.parameters = FollowPathParameters(
             max_vel_x=max_vel_x,
             max_vel_theta=max_vel_theta,
             allow_reversing=allow_reversing,
             max_path_distance=FARTHEST,
+            **inertia,
         )
 
     def set_plan(self, path: Path) -> None:
@@ -173,7 +174,7 @@ class KeepingToPath:
         keeps = drives and (
             self._has_stood(request.pose, stood >= p.keep_to_path_after)
             or is_narrow()
-            or self._follower.to_tight_place(request.pose) < math.inf
+            or self._follower.to_tight_place(request.pose, request.velocity.vx) < math.inf
         )
         if keeps:
             along, reason = self._along_path(request, limits, around, accepts)

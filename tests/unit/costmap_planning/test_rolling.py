@@ -7,10 +7,11 @@ import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.controllers.inertia import braking_distance
 from mbf_abstract.maps.controllers.room_to_turn import CREEPING
 from mbf_abstract.maps.controllers.tight_places import CLOSE_FROM, speed_before
 from mbf_abstract.plugins import ControlRequest
-from mbf_costmap_nav.control.rolling import braking_distance, rolled_poses
+from mbf_costmap_nav.control.rolling import rolled_poses
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from unit.costmap_planning.long_robot import LONG_ROBOT, RESOLUTION, walled

@@ -1,0 +1,148 @@
+"""What inertia asks of a controller: commands that the robot can reach, turns that end in time, slowly into bends.
+
+When to use: in controllers that steer to a point ahead, on all maps. When not: samplers, whose rollouts accelerate as
+the robot does. Without ``acc_lim_x`` and ``acc_lim_theta`` the robot is taken to follow at once, as small robots on
+wheels nearly do.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import FloatArray, Twist
+from mbf_abstract.geometry.arithmetic import arctan2, norm
+from mbf_abstract.maps.controllers.room_to_turn import CREEPING
+from mbf_abstract.parameters import PluginParameters, parameter
+
+SPACING, ARM = 0.1, 2
+"""Distance [m] of the points of a path ahead; a bend is what it turns by over so many of them."""
+PLANNED = 0.7
+"""Share of its braking that is planned with: a robot that cuts its path comes to the end sooner than by its length."""
+LOOKS = 4.0
+"""So often a robot is asked at least while it drives as far as it looks ahead."""
+
+
+class Inertia(Protocol):
+    """What parameters state of a robot's inertia: those of this module, or of a controller that had them before."""
+
+    @property
+    def acc_lim_x(self) -> float:
+        """Largest change of speed [m/s^2]."""
+
+    @property
+    def acc_lim_theta(self) -> float:
+        """Largest change of the yaw rate [rad/s^2]."""
+
+    @property
+    def control_period(self) -> float:
+        """Time between two calls [s]."""
+
+
+class InertiaParameters(PluginParameters):
+    """What a robot can change of its velocity."""
+
+    acc_lim_x: float = parameter(
+        math.inf, "Largest change of speed; inf = it follows at once.", unit="m/s^2", gt=0.0, allow_inf=True
+    )
+    acc_lim_theta: float = parameter(
+        math.inf, "Largest change of the yaw rate; inf = it follows at once.", unit="rad/s^2", gt=0.0, allow_inf=True
+    )
+    control_period: float = parameter(0.05, "Time between two calls, for accelerations.", unit="s", gt=0.0, le=1.0)
+
+    @property
+    def reaction_time(self) -> float:
+        """Time [s] in which a robot goes on as before; 0 for one that follows at once."""
+        return self.control_period if self.acc_lim_x < math.inf else 0.0
+
+    def reachable(self, command: Twist, measured: Twist, turning: float = math.inf) -> Twist:
+        """What the robot can do of a command until the next one: an arc is kept, it brakes before a turn.
+
+        ``turning`` [rad/s] is its largest yaw rate.
+        """
+        if self.acc_lim_x == self.acc_lim_theta == math.inf:
+            return command
+        gain, turn_gain = self.acc_lim_x * self.control_period, self.acc_lim_theta * self.control_period
+        speed = within(command.vx, measured.vx, gain)
+        turn = command.wz * speed / command.vx if command.vx != 0.0 else command.wz
+        if command.vx == 0.0 != command.wz and abs(speed) > CREEPING:
+            turn = 0.0
+        return Twist.planar(speed, command.vy, within(within(turn, measured.wz, turn_gain), 0.0, turning))
+
+    def turn_rate(self, rate: float, angle: float) -> float:
+        """A yaw rate [rad/s] from which the robot can stop when it has turned by ``angle`` [rad], by half its braking.
+
+        A rate in proportion to the angle asks for up to twice as much braking as the rate at which this limit begins.
+        """
+        if self.acc_lim_theta == math.inf:
+            return rate
+        most = stopping_speed(abs(angle), 0.5 * self.acc_lim_theta, self.control_period)
+        return max(-most, min(rate, most))
+
+
+def within(wanted: float, now: float, change: float) -> float:
+    """The value nearest to a wanted one that differs from that of now by ``change`` at most."""
+    return max(now - change, min(wanted, now + change))
+
+
+def stopping_speed(distance: float, deceleration: float, reaction_time: float = 0.0) -> float:
+    """Speed from which a robot stops within a distance, of which it drives a part until it begins to brake.
+
+    Units agree: m, m/s^2 and s, or those of angles.
+    """
+    if deceleration == math.inf:
+        return math.inf
+    lost = deceleration * reaction_time
+    return math.sqrt(lost * lost + 2.0 * deceleration * max(distance, 0.0)) - lost
+
+
+def braking_distance(speed: float, deceleration: float) -> float:
+    """Length [m] that a robot rolls until it creeps; 0 for one that creeps or stands, or follows at once."""
+    return max(speed**2 - CREEPING**2, 0.0) / (2.0 * deceleration)
+
+
+def speed_on_path(tracker: PathTracker, speed: float, look_ahead: float, p: Inertia, turning: float) -> float:
+    """The speed [m/s] at which a robot comes along its path; inf where it does not need to be slower.
+
+    Parameters
+    ----------
+    speed : float
+        Of the robot now [m/s].
+    look_ahead : float
+        How far ahead [m] lies the point it steers to; bends before it are the business of the steering.
+    turning : float
+        Its largest yaw rate [rad/s].
+    """
+    if p.acc_lim_x == math.inf:
+        return math.inf
+    reach = look_ahead + braking_distance(speed, PLANNED * p.acc_lim_x) + 2.0 * abs(speed) * p.control_period
+    end = min(tracker.progress + reach, tracker.next_cusp)
+    points = tracker.points_at(np.arange(tracker.progress, end + SPACING, SPACING))[:, :2]
+    bends = speed_before_bends(points, look_ahead, p, turning)
+    return min(bends, look_ahead / (LOOKS * p.control_period))
+
+
+def speed_before_bends(points: FloatArray, look_ahead: float, p: Inertia, turning: float) -> float:
+    """The speed [m/s] from which a robot has braked for every bend of a path ahead.
+
+    Parameters
+    ----------
+    points : (n, 2) float64
+        Of the path, ``SPACING`` [m] apart, from the robot on.
+    """
+    if len(points) <= 2 * ARM:
+        return math.inf
+    chords = points[ARM:] - points[:-ARM]
+    yaws = arctan2(chords[:, 1], chords[:, 0])
+    turns = np.abs((yaws[ARM:] - yaws[:-ARM] + math.pi) % (2.0 * math.pi) - math.pi)
+    is_end = norm(chords) < 0.5 * SPACING
+    turns[is_end[ARM:] | is_end[:-ARM]] = 0.0
+    braking = PLANNED * p.acc_lim_x
+    times = np.maximum(turns / turning, 2.0 * np.sqrt(turns / p.acc_lim_theta))
+    speeds = np.maximum(look_ahead / np.maximum(times, 1e-9), CREEPING)
+    room = np.maximum(SPACING * (ARM + np.arange(len(turns))) - look_ahead, 0.0)
+    lost = braking * p.control_period
+    return max(float(np.min(np.sqrt(lost * lost + speeds * speeds + 2.0 * braking * room) - lost)), CREEPING)

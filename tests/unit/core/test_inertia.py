@@ -1,0 +1,107 @@
+"""Commands that a robot with inertia can reach, turns that end in time, and slowly into bends."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.maps.controllers.inertia import (
+    InertiaParameters,
+    braking_distance,
+    speed_before_bends,
+    speed_on_path,
+    stopping_speed,
+)
+from mbf_abstract.maps.controllers.room_to_turn import CREEPING
+
+AT_ONCE = InertiaParameters()
+SLOW = InertiaParameters(acc_lim_x=0.5, acc_lim_theta=0.5, control_period=0.1)
+
+
+def planar(command):
+    return command.vx, command.vy, command.wz
+
+
+def test_a_robot_that_follows_at_once_is_commanded_as_it_is_wanted():
+    for command in (Twist.planar(0.5, 0.1, 0.3), Twist.planar(-0.5), Twist.planar(wz=2.0)):
+        assert AT_ONCE.reachable(command, Twist.planar(3.0, wz=-3.0)) == command
+    assert AT_ONCE.turn_rate(1.7, 0.01) == 1.7
+    assert AT_ONCE.reaction_time == 0.0
+
+
+# measured, wanted: commanded
+@pytest.mark.parametrize(
+    ("measured", "wanted", "expected"),
+    [
+        ((0.5, 0.0, 0.5), (0.1, 0.0, 0.1), (0.45, 0.0, 0.45)),  # it keeps to the circle while it brakes
+        ((0.2, 0.0, 0.1), (0.5, 0.0, 0.25), (0.25, 0.0, 0.125)),
+        ((0.5, 0.0, 0.0), (-0.1, 0.0, 0.0), (0.45, 0.0, 0.0)),
+        ((0.5, 0.0, 0.0), (0.0, 0.0, 1.0), (0.45, 0.0, 0.0)),  # straight on until it creeps
+        ((0.1, 0.0, 0.0), (0.0, 0.0, 1.0), (0.05, 0.0, 0.05)),
+        ((0.2, 0.0, 0.0), (0.2, 0.0, 0.4), (0.2, 0.0, 0.05)),
+    ],
+)
+def test_a_command_changes_by_what_the_robot_can_reach(measured, wanted, expected):
+    command = SLOW.reachable(Twist.planar(*wanted), Twist.planar(*measured))
+    assert planar(command) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("reaction_time", [0.0, 0.1, 0.4])
+def test_from_the_stopping_speed_a_robot_that_reacts_late_stops_where_it_should(reaction_time):
+    speed = stopping_speed(0.7, 0.5, reaction_time)
+    assert speed * reaction_time + speed**2 / (2.0 * 0.5) == pytest.approx(0.7)
+    assert stopping_speed(-0.1, 0.5, reaction_time) == 0.0
+    assert stopping_speed(0.7, math.inf, reaction_time) == math.inf
+
+
+def test_a_robot_that_creeps_does_not_roll_on():
+    assert braking_distance(CREEPING, 0.5) == braking_distance(-0.05, 0.5) == 0.0
+    assert braking_distance(0.5, math.inf) == 0.0
+    assert braking_distance(-0.6, 0.5) == pytest.approx(0.35)
+
+
+@pytest.mark.parametrize("acc_lim_theta", [0.3, 1.0, 4.0])
+@pytest.mark.parametrize("period", [0.03, 0.2])
+def test_a_turn_in_proportion_to_the_angle_does_not_overshoot(acc_lim_theta, period):
+    p = InertiaParameters(acc_lim_x=1.0, acc_lim_theta=acc_lim_theta, control_period=period)
+    angle, rate, least = 2.5, 0.0, math.inf
+    for _ in range(round(30.0 / period)):
+        wanted = p.turn_rate(min(2.0 * angle, 1.5), angle)
+        rate = p.reachable(Twist.planar(wz=wanted), Twist.planar(wz=rate)).wz
+        angle -= rate * period
+        least = min(least, angle)
+    assert abs(angle) < 0.05
+    assert least > -0.05
+
+
+def path_with_a_bend(turn):
+    along = np.arange(0.0, 2.01, 0.05)
+    after = along[1:, None] * [math.cos(turn), math.sin(turn)] + [2.0, 0.0]
+    points = np.concatenate([np.column_stack([along, np.zeros_like(along)]), after])
+    return Path.from_points(np.column_stack([points, np.zeros(len(points))]), Pose.planar(0.0, 0.0, turn).orientation)
+
+
+def test_a_robot_comes_to_a_bend_as_slowly_as_it_can_turn_there():
+    fast = InertiaParameters(acc_lim_x=0.5, acc_lim_theta=1.0)
+    straight, bent = PathTracker(path_with_a_bend(0.0)), PathTracker(path_with_a_bend(1.5))
+    limit = 0.5 / (4.0 * 0.05)
+    assert speed_on_path(straight, 1.5, 0.5, fast, 1.0) == pytest.approx(limit)
+    speeds = []
+    for x in np.arange(0.0, 1.6, 0.1):
+        bent.update((x, 0.0, 0.0))
+        speeds.append(speed_on_path(bent, 1.5, 0.5, fast, 1.0))
+    in_bend = 0.5 / (2.0 * math.sqrt(1.5))
+    assert speeds[-1] == pytest.approx(in_bend, rel=0.15)
+    assert all(later <= earlier + 1e-9 for earlier, later in pairwise(speeds))
+    for earlier, later in pairwise(speeds):
+        assert earlier**2 - later**2 <= 2.0 * 0.5 * 0.1 * 1.3  # no harder than it can brake
+    assert speed_on_path(bent, 1.5, 0.5, AT_ONCE, 1.0) == math.inf
+
+
+def test_the_end_of_a_path_is_no_bend():
+    points = np.column_stack([np.minimum(np.arange(0.0, 1.0, 0.1), 0.45), np.zeros(10)])
+    assert speed_before_bends(points, 0.1, SLOW, 1.0) > 10.0
+    assert speed_before_bends(points[:3], 0.1, SLOW, 1.0) == math.inf
