@@ -130,10 +130,10 @@ def test_relaxing_leaves_every_cell_forbidden_on_which_the_robot_would_touch_som
 
 
 def test_an_inflation_narrower_than_the_robot_is_widened_and_reported_until_the_robot_is_smaller(build):
-    costmap = build("inflation", inflation={"inflation_radius": 0.3}, robot_radius=0.6)
+    costmap = build("inflation", inflation={"inflation_radius": 0.6}, robot_radius=1.2)
     (warning,) = costmap.configuration_warnings()
-    assert warning.startswith("layer 'inflation': inflation_radius 0.3 m is smaller than the inscribed radius")
-    costmap.set_footprint(type(costmap.footprint).circle(0.3))
+    assert warning.startswith("layer 'inflation': inflation_radius 0.6 m is smaller than the inscribed radius")
+    costmap.set_footprint(type(costmap.footprint).circle(0.6))
     assert costmap.configuration_warnings() == []
 
 
@@ -178,16 +178,16 @@ def test_a_map_nearly_all_occupied_is_reported(free, reported):
 
 
 def test_a_robot_on_a_map_without_inflation_is_reported_and_a_point_is_not(build):
-    (warning,) = build("static", robot_radius=0.5).configuration_warnings()
-    assert warning == "no inflation layer: planners treat the robot, whose inscribed radius is 0.49 m, as a point"
-    assert build("static", "inflation", robot_radius=0.5).configuration_warnings() == []
-    assert build("static").configuration_warnings() == build(robot_radius=0.5).configuration_warnings() == []
+    (warning,) = build("static", robot_radius=0.54).configuration_warnings()
+    assert warning == "no inflation layer: planners treat the robot, whose inscribed radius is 0.53 m, as a point"
+    assert build("static", "inflation", robot_radius=0.54).configuration_warnings() == []
+    assert build("static").configuration_warnings() == build(robot_radius=0.54).configuration_warnings() == []
 
 
 def test_obstacles_behind_the_last_inflation_are_reported_as_nothing_inflates_them(build):
-    (warning,) = build("inflation", "static", robot_radius=0.5).configuration_warnings()
+    (warning,) = build("inflation", "static", robot_radius=0.54).configuration_warnings()
     assert "layer 'static' comes behind the last inflation layer" in warning
-    assert build("obstacle", "inflation", "speed_limit", robot_radius=0.5).configuration_warnings() == []
+    assert build("obstacle", "inflation", "speed_limit", robot_radius=0.54).configuration_warnings() == []
 
 
 @pytest.mark.parametrize(("width", "reported"), [(4.0, True), (8.0, False)])
