@@ -204,7 +204,7 @@ def test_a_heading_in_degrees_is_noted():
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("cloud.pcd", "cloud.pcd:1: expected a configuration, map or mesh (.bmp, .dae,"),
+        ("cloud.pcd", "cloud.pcd:1: expected a configuration, map or mesh (.asc, .bmp, .dae,"),
         ("cloud.pcd", "of a point cloud, mbf map build makes a mesh, got a file that ends with '.pcd'"),
         ("photo.png", "photo.png:1: expected an image (pgm, png, bmp), got a file of another kind"),
     ],
