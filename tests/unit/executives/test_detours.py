@@ -65,12 +65,16 @@ def test_a_detour_that_fails_is_not_asked_for_until_the_patience_is_over(make_se
     assert len([request for request in session.planner.requests if request.start.x < 0.6]) == 2
 
 
-@pytest.mark.parametrize(("standing", "yields"), [(5.5, []), (6.5, ["back_up"])])
-def test_before_one_that_came_along_the_path_and_stands_the_drive_ends(
-    make_session, recoveries, on_the_path, standing, yields
+@pytest.mark.parametrize(
+    ("along", "standing", "yields"),
+    [(-1.0, 5.5, []), (-1.0, 6.5, ["back_up"]), (1.0, 9.5, []), (1.0, 10.5, ["back_up"])],
+)
+def test_before_one_that_stands_for_too_long_the_drive_ends(
+    make_session, recoveries, on_the_path, along, standing, yields
 ):
+    """One that came along the path; and one that went along it, and may have stood in a queue until then."""
     session = make_session()
-    on_the_path(session, somebody(standing=standing, along=-1.0))
+    on_the_path(session, somebody(standing=standing, along=along))
     creep(session, 40)
     session.planner.play(straight_plan, NO_PATH)
     assert run(session).success
