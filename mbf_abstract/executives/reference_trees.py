@@ -26,7 +26,7 @@ from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery
 from mbf_abstract.executives.map_leaves import CheckPose, PathBlocked
 from mbf_abstract.executives.pacing import Delay, InBackground
 from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
-from mbf_abstract.executives.trees.by_motion import MEETING, EndDrive, PickByMotion
+from mbf_abstract.executives.trees.by_motion import EndDrive, PickByMotion
 from mbf_abstract.executives.trees.options import TreeOptions
 from mbf_abstract.executives.watchdogs import MotorWatchdog, OscillationWatchdog, ProgressWatchdog
 from mbf_abstract.maps.tracking.objects import Motion
@@ -133,7 +133,7 @@ def _beside(options: TreeOptions, planner: str) -> Behaviour:
     came: Behaviour | None = None
     if options.give_way:
         again = _detour("with more room for both", options, planner, SECOND_PLANNER_SLOT, once=True)
-        came = Selector("go around or give way", memory=True, children=[again, EndDrive("drive is over?", MEETING)])
+        came = Selector("go around or give way", memory=True, children=[again, EndDrive("drive is over?")])
     beside = PickByMotion("who is beside it?", known, Failure("nobody"), came, standing=STANDING)
     return Sequence("update a narrow path", memory=True, children=[creeps, beside])
 

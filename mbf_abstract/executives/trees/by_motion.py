@@ -21,8 +21,9 @@ MARGIN = 0.2
 """Who is this near [m] to the robot's outline on its path may keep its controller from following that."""
 LONGEST_PASSING = 3.0
 """So far [m] from where a detour was taken the robot still passes who stands there."""
-MEETING = 6.0
-"""Who was seen to move and has stood for so long [s] before a robot that creeps does not go on before that one."""
+MEETING, QUEUE = 6.0, 10.0
+"""Who was seen to move and has stood for so long [s] before a robot that creeps does not go on before that one. The
+second is for who went where the robot goes, and may wait for somebody ahead who loads and turns."""
 TOGETHER, FACING = 2.5, 3.0
 """Who came along the path, and had stood for no longer than the first [s] when the robot was seen to creep, stopped for
 the robot; after the second [s] it does not go on before the robot."""
@@ -43,7 +44,7 @@ class PickByMotion(Composite):
         Where no tracked object is in the way.
     came : Behaviour, optional
         For one that waits for the robot: it was seen to come along the path before it stood, or to move at all, and
-        has stood for ``MEETING``. None = as ``by_motion`` has it.
+        has stood for ``MEETING``, or ``QUEUE``. None = as ``by_motion`` has it.
     length : float
         How far ahead along the path [m] counts.
     standing : float
@@ -103,7 +104,12 @@ def blockages_ahead(mission: MissionContext, margin: float) -> list[Blockage]:
 def waits_for_robot(first: Blockage) -> bool:
     """Whether one that stands on the path came along it, or was seen to move and stands for longer than to load."""
     moved = first.by.course != (0.0, 0.0)
-    return first.along <= -ALONG or (moved and first.by.standing >= MEETING)
+    return first.along <= -ALONG or (moved and first.by.standing >= _longest_stand(first))
+
+
+def _longest_stand(first: Blockage) -> float:
+    """How long [s] one that was seen to move stands for another reason than the robot."""
+    return QUEUE if first.along >= ALONG else MEETING
 
 
 def first_in_the_way(mission: MissionContext, length: float, margin: float) -> Blockage | None:
@@ -112,15 +118,14 @@ def first_in_the_way(mission: MissionContext, length: float, margin: float) -> B
 
 
 class EndDrive(Leaf):
-    """End the drive beside which it runs: one that waits for the robot has stood in the way for ``patience`` [s].
+    """End the drive beside which it runs: one that waits for the robot has stood in the way for too long.
 
     Neither gets on until one gives way. The mission's failure becomes BLOCKED_PATH; where that one has stood for less,
     or a detour around it is driven, the node fails.
     """
 
-    def __init__(self, name: str, patience: float, length: float = 3.0) -> None:
+    def __init__(self, name: str, length: float = 3.0) -> None:
         super().__init__(name)
-        self.patience = patience
         self.length = length
         self._met = (0, 0.0)  # number of the last one, and when [s] it stopped
         self._together = False  # whether the robot was seen to creep soon after that
@@ -141,7 +146,7 @@ class EndDrive(Leaf):
         if first.by.number != number or abs(stops - stopped) > SAME_STOP:
             self._met, self._together = (first.by.number, stops), first.by.standing <= TOGETHER
         stopped_for_robot = self._together and first.along <= -ALONG
-        return min(FACING, self.patience) if stopped_for_robot else self.patience
+        return FACING if stopped_for_robot else _longest_stand(first)
 
     def _passes(self) -> bool:
         """Whether the robot drives a detour that was taken near here."""

@@ -10,8 +10,9 @@ nothing the map knows: back into a bay, around a corner, or a step aside in a ha
 tracked near its path is taken to go beside it, and that path is kept free, too, where there is such a place. The
 manoeuvre is driven slowly, each command checked as in every recovery, and searched anew where one is refused (see
 ``pulling_out``); afterwards it stands for a time that is drawn anew for each run, or until those who were tracked on
-its path, since it set out, have left it. Where it could not turn to its path there, it drives the manoeuvre back. Where
-there is no such place it ends with IMPASSABLE at once.
+its path, since it set out, have left it. Where who stood ahead drives on, it had waited for somebody else, and the
+robot stops where it can turn to its path (see ``left_path``). Where it could not turn to its path in the place, it
+drives the manoeuvre back. Where there is no such place it ends with IMPASSABLE at once.
 
 Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
 goes first waits until the others have left its path; the others pull out, also off the path that the first one has
@@ -33,15 +34,13 @@ from dataclasses import replace
 from functools import partial
 from typing import ClassVar
 
-import numpy as np
-
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.pull_out import in_plane_of, paths_beside, paths_to_keep_free
+from mbf_abstract.maps.recoveries.left_path import LeftPath
 from mbf_abstract.maps.recoveries.pulling_out import PullingOutParameters, PullingOutRecovery
 from mbf_abstract.maps.recoveries.wait import stand
-from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
@@ -50,7 +49,6 @@ from mbf_abstract.traffic.right_of_way import right_of_way
 
 WAIT_PERIOD = 0.5  # s between two looks at where the other robots are
 MOVED = 0.2  # m, of another robot that does not stand
-AHEAD = 2.0  # m of its path ahead that must be clear of others before it ends its wait early
 MOST_WAITS = 3.0  # times longest_wait, for robots that move again and again
 NOT_THERE = frozenset([RecoveryOutcome.IMPASSABLE, RecoveryOutcome.PAT_EXCEEDED])
 """How it ends to find no place, or not to get there."""
@@ -76,12 +74,10 @@ class GiveWayRecovery(PullingOutRecovery):
 
     Parameters: ClassVar[type[PluginParameters]] = GiveWayParameters
     parameters: GiveWayParameters
-    _left_at: Pose | None = None
-    """Where it has set out to pull out."""
+    _left: tuple[Pose, LeftPath] | None = None
+    """Where it has set out to pull out, and the path that it left there; None among robots that go first."""
     _track: FloatArray
     """What it had driven by then (n, 3) [m]; to pull out is no part of its path."""
-    _seen = False
-    """Whether somebody has been on its path since then."""
 
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Pull out and wait, or wait first, where the right of way is this robot's; then forget where others stood."""
@@ -105,14 +101,15 @@ class GiveWayRecovery(PullingOutRecovery):
                 self.traffic.wait_was_in_vain(rivals)
         before = self._before(rivals)
         self.traffic.yields = True
-        begin = self._left_at = request.motion.pose()
-        self._track, self._seen = self.robot.recent_track(), False
+        begin, self._track = request.motion.pose(), self.robot.recent_track()
+        left = LeftPath(self.navigation_map, self.on_map(begin), self.parameters.distance, self.clock.now())
+        self._left = None if before else (begin, left)
         try:
             result = self.pull_out(request, self._keep_free, "its path")
             if result.success:
-                return self._stand_aside(request, begin, before)
+                return self._stand_aside(request, begin, before, left)
         finally:
-            self.traffic.yields, self._left_at = False, None
+            self.traffic.yields, self._left = False, None
         return self._without_room(request, before, result) if result.outcome in NOT_THERE else result
 
     def _ask_for_room(self, request: RecoveryRequest, rivals: Sequence[Announcement]) -> RecoveryResult:
@@ -130,55 +127,46 @@ class GiveWayRecovery(PullingOutRecovery):
         finished: Callable[[Pose], bool] = lambda _: False,
         obstacle_ahead: Callable[[Pose, Twist], str] | None = None,
     ) -> RecoveryResult:
-        """As every recovery; who is on the path that it leaves is noted, as they may have passed when it stands."""
+        """As every recovery; over where they drive on for whom it leaves its path, who may also pass meanwhile."""
 
         def looks_and_finished(pose: Pose) -> bool:
-            if self._left_at is not None:
-                self._seen = self._seen or self._somebody_on_the_path(self._left_at, pose)
-            return finished(pose)
+            if self._left is None:
+                return finished(pose)
+            (begin, left), place, now = self._left, self.on_map(pose), self.clock.now()
+            left.look(place, now)
+            return (left.is_free_again(place, now) and self.turns_to(begin, pose)) or finished(pose)
 
         return super().drive(request, velocity, looks_and_finished, obstacle_ahead)
 
-    def _stand_aside(self, request: RecoveryRequest, begin: Pose, before: list[Announcement]) -> RecoveryResult:
+    def _stand_aside(
+        self, request: RecoveryRequest, begin: Pose, before: list[Announcement], left: LeftPath
+    ) -> RecoveryResult:
         """Wait beside the path, until the robots that go first have passed; go back where it cannot turn to it."""
         p, place = self.parameters, request.motion.pose()
         if before:
             result = self._wait_for(request, before, f"has pulled out at ({place.x:.2f}, {place.y:.2f}) for")
         else:
-            result = self._stand_until_clear(request, begin, p.wait + p.random_extra * float(self.rng.random()))
-            result = replace(result, message=f"{result.message} at ({place.x:.2f}, {place.y:.2f}), beside its path")
+            result = self._stand_until_clear(request, left, p.wait + p.random_extra * float(self.rng.random()))
         if not result.success or self.turns_to(begin, request.motion.pose()):
             return result
         back = self.drive_back(request, partial(self.turns_to, begin))
         text = f"{result.message}; drove back, as it cannot turn there{back.message and f': {back.message}'}"
         return replace(back if request.cancel_token.cancelled else result, message=text)
 
-    def _stand_until_clear(self, request: RecoveryRequest, begin: Pose, duration: float) -> RecoveryResult:
-        """Stand for a time [s]; less, where somebody was seen on the way that it left at ``begin``, and now nobody."""
-        place, begun, result = request.motion.pose(), self.clock.now(), RecoveryResult(0)
-        while result.success and (left := begun + duration - self.clock.now()) > 0.0:
-            present = self._somebody_on_the_path(begin, place)
-            if self._seen and not present:
+    def _stand_until_clear(self, request: RecoveryRequest, left: LeftPath, duration: float) -> RecoveryResult:
+        """Stand for a time [s]; less, where somebody was seen on the path that it left, and is gone or drives on."""
+        pose = request.motion.pose()
+        place, begun, result, why = self.on_map(pose), self.clock.now(), RecoveryResult(0), "beside its path"
+        while result.success and (still := begun + duration - (now := self.clock.now())) > 0.0:
+            present = left.look(place, now)
+            if left.is_free_again(place, now):
+                why = "until who stood ahead drove on"
                 break
-            self._seen = self._seen or present
-            result = stand(request, min(left, WAIT_PERIOD))
-        waited = f"waited {self.clock.now() - begun:.3g} s"
+            if left.seen and not present:
+                break
+            result = stand(request, min(still, WAIT_PERIOD))
+        waited = f"waited {self.clock.now() - begun:.3g} s at ({pose.x:.2f}, {pose.y:.2f}), {why}"
         return replace(result, message=waited) if result.success else result
-
-    def _somebody_on_the_path(self, begin: Pose, place: Pose) -> bool:
-        """Whether someone who is not parked is near the path from ``place`` back to ``begin`` and ``AHEAD`` ahead."""
-        back, here = self.on_map(begin), self.on_map(place)
-        share = np.linspace(0.0, 1.0, 21)[:, None]
-        on = np.asarray(back.position) + share * back.rotation[:, 0] * AHEAD
-        path = np.concatenate([np.asarray(here.position) + share * np.subtract(back.position, here.position), on])
-        known = self.navigation_map.tracked_objects(self.clock.now())
-        same_storey, near = self.navigation_map.same_storey, self.parameters.distance
-        return any(
-            one.motion is not Motion.PARKED
-            and abs(one.z - back.z) < same_storey
-            and float(norm(path[:, :2] - (one.x, one.y)).min()) < near
-            for one in known
-        )
 
     # --------------------------------------------------------------------------------------------- the other robots
     def _before(self, rivals: Sequence[Announcement]) -> list[Announcement]:

@@ -102,6 +102,7 @@ def propagate_distances(
             far_count += ONE
     threshold, step = np.float32(0.0), np.float32(threshold_step)
     visits = 0
+    following, next_begin, next_end = Index(len(distances)), Index(0), Index(0)  # of nobody yet
     while True:
         # 1. Empty the near list; improved vertices go to the list that their new key belongs to.
         while head != tail:
@@ -116,14 +117,20 @@ def propagate_distances(
                 prefetch(distances, ahead)
                 prefetch(predecessors, ahead)
             if head + _AHEAD < tail:
-                ahead = Index(graph.offsets[near[head + _AHEAD]])
+                ahead = Index(graph.offsets[Index(near[head + _AHEAD])])
                 prefetch(graph.neighbours, ahead)
                 prefetch(graph.neighbours, ahead + _LAST)
                 prefetch(graph.weights, ahead)
                 prefetch(graph.weights, ahead + _LAST)
             state[vertex] = UNQUEUED
             base = distances[vertex]
-            begin, end = Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])
+            # Where the next vertex's edges stand is read before the wrong guess that each vertex costs, not after it.
+            begin, end = next_begin, next_end
+            if vertex != following:
+                begin, end = Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])
+            if head != tail:
+                following = Index(near[head])
+                next_begin, next_end = Index(graph.offsets[following]), Index(graph.offsets[following + ONE])
             while begin < end:
                 # The edges that gain, as bits, without a branch: about one at a vertex does, and nobody knows which.
                 # The last one first, see ``lowest_bit.py``.

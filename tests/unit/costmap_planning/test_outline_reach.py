@@ -30,18 +30,22 @@ def naive_reach(lethal, corners, first):
     places = np.argwhere(np.pad(lethal, 8, constant_values=True))[:, ::-1] - 8.0
     sides = list(zip(corners, np.roll(corners, -1, axis=0), strict=True))
 
+    longest = np.hypot(*corners.T).max() + 1.0
+    offsets = np.array([(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)])[:, None]
+
     def is_open(ix, iy, heading):
-        deep = np.ones(len(places), dtype=bool)
+        around = places - (ix, iy)
+        shifted = around[np.hypot(*around.T) < longest] + offsets
+        deep = np.ones(shifted.shape[1], dtype=bool)
         for turn in (-0.5, 0.5):
             angle = (heading + turn) * 2.0 * math.pi / HEADINGS
-            for offset in ((-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)):
-                x, y = (places - (ix, iy) + offset).T
-                x, y = math.cos(angle) * x + math.sin(angle) * y, math.cos(angle) * y - math.sin(angle) * x
-                points = np.column_stack([x, y])
-                deep &= inside_polygon(points, corners)
-                for a, b in sides:
-                    along = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
-                    deep &= np.hypot(*(points - a - along[:, None] * (b - a)).T) >= DEPTH
+            c, s = math.cos(angle), math.sin(angle)
+            points = (shifted @ [[c, -s], [s, c]]).reshape(-1, 2)
+            inside = inside_polygon(points, corners)
+            for a, b in sides:
+                along = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+                inside &= np.hypot(*(points - a - along[:, None] * (b - a)).T) >= DEPTH
+            deep &= inside.reshape(4, -1).all(axis=0)
         return not deep.any()
 
     seen, waiting, answers = {first}, [first], {}

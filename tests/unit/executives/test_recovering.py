@@ -296,13 +296,13 @@ def test_one_node_may_stand_for_several_motions_and_for_nobody(scripted, tick):
         (-1.0, (-0.2, 0.0), 1.5, "came"),
         (-0.5, (-0.1, 0.2), 1.5, "other"),
         (-0.5, (-0.1, 0.2), 6.0, "came"),
-        (1.0, (0.2, 0.0), 5.9, "other"),
-        (1.0, (0.2, 0.0), 6.0, "came"),
+        (1.0, (0.2, 0.0), 9.9, "other"),
+        (1.0, (0.2, 0.0), 10.0, "came"),
         (0.0, (0.0, 0.0), 6.0, "other"),
     ],
 )
 def test_who_waits_for_the_robot_has_a_child_of_its_own(scripted, tick, along, course, standing, chosen):
-    """One that came along the path, or that was seen to move and stands too long to load: it may have turned round."""
+    """One that came along the path, or that was seen to move and stands too long to load, or to queue where it goes."""
     nodes = {name: scripted("S") for name in ("other", "came")}
     tree = PickByMotion("who?", {Motion.WAITING: nodes["other"]}, scripted("F"), nodes["came"])
     among(tree)
