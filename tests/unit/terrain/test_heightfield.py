@@ -81,7 +81,7 @@ def test_crop_keeps_the_surface() -> None:
     part = field.crop(-0.5, 1.5, 6.0, 8.0)
     assert part.x0 >= -0.5 and part.x_max <= 1.5 and part.y0 >= 6.0 and part.y_max <= 8.0
     assert np.allclose(part.height_at(0.33, 7.1), field.height_at(0.33, 7.1), atol=1e-6)
-    with pytest.raises(ValueError, match="expected a part of x -1 to 2.8"):
+    with pytest.raises(ValueError, match=r"expected a part of x -1 to 2\.8"):
         field.crop(100.0, 101.0, 0.0, 1.0)
 
 
