@@ -4,7 +4,7 @@ A package adds commands by an entry point of the group ``mbf.commands`` whose fu
 ``terrain`` does with ``mbf run``. Every command imports what it needs when it is called, so that ``mbf --help`` is
 there at once.
 
-Exit codes: 0 success, 1 the run was no success or no path was found, 2 bad arguments or a bad file.
+Exit codes: 0 success, 1 the run was no success or no path was found, 2 bad arguments or a bad file, 130 Ctrl-C.
 """
 
 from __future__ import annotations

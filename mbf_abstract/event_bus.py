@@ -19,7 +19,7 @@ from typing import Any
 from mbf_abstract.event_sinks import MemorySink
 from mbf_abstract.event_values import FLOAT_DIGITS, error_text, to_json_value, well_formed
 from mbf_abstract.events import Event, EventKind, EventSink
-from mbf_abstract.time.clock import is_for_the_program
+from mbf_abstract.time.program_end import is_for_the_program
 
 _logger = logging.getLogger(__name__)
 _logger.addHandler(logging.NullHandler())

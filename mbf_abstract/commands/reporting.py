@@ -8,6 +8,8 @@ from contextlib import contextmanager
 
 import typer
 
+from mbf_abstract.time.program_end import end_of_the_program
+
 FAILURE = 1
 BAD_INPUT = 2
 TRACEBACK_VARIABLE = "MBF_TRACEBACK"
@@ -21,6 +23,9 @@ def readable_errors() -> Iterator[None]:
     except (typer.Exit, typer.Abort, typer.BadParameter):
         raise
     except Exception as error:
+        ending = end_of_the_program(error)
+        if ending is not None:
+            raise ending from None
         if os.environ.get(TRACEBACK_VARIABLE):
             raise
         from mbf_abstract.config.findings import ConfigError, text_of

@@ -14,7 +14,8 @@ from mbf_abstract.event_bus import EventBus
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Command, Twist
-from mbf_abstract.time.clock import Clock, Condition, ThreadDetached, is_for_the_program
+from mbf_abstract.time.clock import Clock, Condition, ThreadDetached
+from mbf_abstract.time.program_end import is_for_the_program
 
 
 class CommandWriter:

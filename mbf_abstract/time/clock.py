@@ -46,12 +46,6 @@ class ThreadDetached(BaseException):
     """
 
 
-def is_for_the_program(error: BaseException) -> bool:
-    """Whether this is Ctrl-C or SIGTERM, which reach the main thread wherever it is, and no fault of the code there."""
-    on_main_thread = threading.current_thread() is threading.main_thread()
-    return on_main_thread and isinstance(error, (KeyboardInterrupt, SystemExit))
-
-
 class Condition(Protocol):
     """A lock with a wait queue, as ``threading.Condition`` but bound to a clock; not re-entrant."""
 

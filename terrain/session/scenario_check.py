@@ -18,6 +18,7 @@ from mbf_abstract.config.findings import ConfigError, Finding, KeyPath, text_of
 from mbf_abstract.config.yaml_source import YamlDocument
 from mbf_abstract.server.factory import read_config
 from mbf_abstract.server.standing_server import standing_server
+from mbf_abstract.time.program_end import is_for_the_program
 from terrain.description.placeholders import fill_in
 from terrain.provenance.named_files import InputCopies
 from terrain.scenarios.environment import build_environment, with_noise
@@ -194,7 +195,7 @@ class _Collecting:
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
-        if not isinstance(error, Exception):
+        if not isinstance(error, Exception) or is_for_the_program(error):
             return False
         self.failed = True
         self._findings += self._findings_of(error)

@@ -25,6 +25,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, Generic, TypeVar
 
 from mbf_abstract.time.clock import wall_seconds
+from terrain.sweeps.starting_workers import interrupts_wait
 from terrain.sweeps.worker_pool import end_with_the_parent
 
 J = TypeVar("J")
@@ -141,7 +142,8 @@ def _start(do: Callable[[J], R], time_limit: float) -> _Worker[J]:
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_work, args=(do, theirs, time_limit), daemon=False)  # may have children
-    process.start()
+    with interrupts_wait():
+        process.start()
     theirs.close()
     return _Worker(process, ours)
 

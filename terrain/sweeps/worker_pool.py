@@ -19,6 +19,8 @@ from multiprocessing import current_process, get_context
 from types import FrameType
 from typing import TypeVar
 
+from terrain.sweeps.starting_workers import interrupts_arrive, interrupts_wait
+
 J = TypeVar("J")
 R = TypeVar("R")
 
@@ -62,8 +64,9 @@ def _run_in_pool(do: Callable[[J], R], waiting: Iterator[J], workers: int) -> It
     running = dict[Future[R], J]()
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin_worker, (os.getpid(), workers))
     try:
-        for job in itertools.islice(waiting, workers):
-            running[pool.submit(do, job)] = job
+        with interrupts_wait():  # the first job starts all workers
+            for job in itertools.islice(waiting, workers):
+                running[pool.submit(do, job)] = job
         while running:
             for done in wait(running, return_when=FIRST_COMPLETED).done:
                 yield running.pop(done), done.result()
@@ -102,6 +105,7 @@ def end_with_the_parent(parent: int) -> None:
 
     for ending in (signal.SIGTERM, signal.SIGINT):
         signal.signal(ending, lambda number, frame: os._exit(128 + number))
+    interrupts_arrive()
     if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, check)
         signal.setitimer(signal.ITIMER_REAL, PARENT_CHECK, PARENT_CHECK)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mbf_abstract.event_values import error_text
+from mbf_abstract.time.program_end import is_for_the_program
 from mbf_abstract.whole_files import write_whole
 from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recording import Recording
@@ -76,6 +77,8 @@ def _make_all(folder: Path, makers: Makers, on_step: Callable[[str], None] = lam
         except ViewerMissing as missing:
             problems.append(str(missing))
         except Exception as error:  # a run counts whatever becomes of its pictures
+            if is_for_the_program(error):
+                raise
             problems.append(f"{name} could not be made: {type(error).__name__}: {error_text(error)}")
     return list(dict.fromkeys(problems))
 
