@@ -162,7 +162,7 @@ class MeshNavigationServer(MapServer):
         require_packages(Path(file), ".h5")
         from mbf_mesh_nav.files.lvr2_io import write_lvr2_map  # h5py only for those who use it
 
-        write_lvr2_map(self.config.path.parent / file, self.mesh_map, layout=layout)
+        write_lvr2_map(self.config.path.parent / file, self.mesh_map, layout)
         self.runtime.events.emit(EventKind.MAP, "mesh_map", message=f"the map was saved to {file}")
 
     def _report_findings(self) -> None:

@@ -24,12 +24,11 @@ class WaitingFrames:
     Attributes
     ----------
     overflowed : bool
-        Whether more than ``max_answers`` wait; no more answers are taken then.
+        Whether more than ``MAX_ANSWERS`` wait; no more answers are taken then.
     """
 
-    def __init__(self, max_answers: int = MAX_ANSWERS) -> None:
+    def __init__(self) -> None:
         self.overflowed = False
-        self._max_answers = max_answers
         self._answers = 0
         self._waiting: OrderedDict[Hashable, deque[Frame]] = OrderedDict()
 
@@ -41,7 +40,7 @@ class WaitingFrames:
     def answer(self, frame: Frame) -> None:
         """Add a frame that must not be lost."""
         self._answers += 1
-        if self._answers > self._max_answers:
+        if self._answers > MAX_ANSWERS:
             self.overflowed = True
         else:
             self._waiting[object()] = deque([frame])
@@ -73,8 +72,8 @@ class WaitingFrames:
 class Outbox(WaitingFrames):
     """What waits for one client of the server; used on the server's event loop only."""
 
-    def __init__(self, max_answers: int = MAX_ANSWERS) -> None:
-        super().__init__(max_answers)
+    def __init__(self) -> None:
+        super().__init__()
         self._ready = asyncio.Event()
 
     def answer(self, frame: Frame) -> None:

@@ -7,7 +7,7 @@ The core knows no map. A server declares its sections as parameter models; a mod
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from mbf_abstract.config.findings import Finding, KeyPath
@@ -37,11 +37,10 @@ class LayerSpec:
 
 @dataclass(frozen=True)
 class Section:
-    """A checked map section: its own parameters, its layers in order, and the layers' raw blocks by name."""
+    """A checked map section: its own parameters, and its layers in order."""
 
     parameters: ParameterModel
     layers: tuple[LayerSpec, ...] = ()
-    layer_blocks: Mapping[str, Any] = field(default_factory=dict)
 
 
 def split_layer_blocks(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -72,7 +71,7 @@ class SectionValidator:
         layers = self._layers(model, own, blocks, key)
         if parameters is None or len(self._findings) > before:
             return None
-        return Section(parameters, tuple(layers), blocks)
+        return Section(parameters, tuple(layers))
 
     def _layers(
         self, model: type[ParameterModel], own: Mapping[str, Any], blocks: Mapping[str, Any], key: str

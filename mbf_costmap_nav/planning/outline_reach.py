@@ -7,7 +7,6 @@ tenth of a second for a map that such a search takes ten for. When not: to find 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +20,6 @@ FINE_CELLS = 300_000
 """Maps of no more cells are looked at in half cells, larger ones, to save time, in whole ones."""
 LARGEST_REACH = 120
 """An outline of more cells than that from its middle is not looked at."""
-
-
-@dataclass(frozen=True)
-class OutlineReach:
-    """Whether the outline gets there, and else the place (x, y) [m] where it comes nearest to where it could go on."""
-
-    gets_there: bool
-    place: tuple[float, float] | None = None
 
 
 class _Bins:
@@ -63,29 +54,34 @@ class _Bins:
         return self.costmap.origin_x + (ix + 0.5) * self.side, self.costmap.origin_y + (iy + 0.5) * self.side
 
 
-def outline_reach(
+def where_outline_is_stuck(
     costmap: Costmap, footprint: Footprint, start: Pose, goal: Pose, tolerance: float = 0.0
-) -> OutlineReach:
-    """Whether an outline that moves sideways and turns on the spot gets from a pose to another.
+) -> tuple[float, float] | None:
+    """Return where an outline that moves sideways and turns on the spot gets no farther on its way between poses.
 
-    ``tolerance`` [m]: how far from the goal will do, at whatever heading. It "gets there", as nothing is known, if it
-    is a point or hundreds of cells long, or touches something at an end already.
+    ``tolerance`` [m]: how far from the goal will do, at whatever heading.
+
+    Returns
+    -------
+    (x, y) [m], or None
+        The place that it reaches nearest to where it could go on. None where it gets to the goal, or where nothing is
+        known: it is a point or hundreds of cells long, or touches something at an end already.
     """
     if len(footprint.vertices) < 3:
-        return OutlineReach(True)
+        return None
     bins = _Bins(costmap, footprint)
     if bins.reach > LARGEST_REACH:
-        return OutlineReach(True)
+        return None
     words, first, last = bins.open(), bins.of(start), bins.of(goal)
     if not _has(words, first) or (tolerance == 0.0 and not _has(words, last)):
-        return OutlineReach(True)
+        return None
     reached = flood(words, *first)
     if tolerance > 0.0:
         around = _window(reached, last, (tolerance + costmap.resolution) / bins.side)
-        return OutlineReach(True) if around.any() else OutlineReach(False, _nearest(bins, reached, last))
+        return None if around.any() else _nearest(bins, reached, last)
     if _has(reached, last):
-        return OutlineReach(True)
-    return OutlineReach(False, _nearest(bins, reached, last, flood(words, *last)))
+        return None
+    return _nearest(bins, reached, last, flood(words, *last))
 
 
 def _has(words: NDArray[np.uint64], of_bin: tuple[int, int, int]) -> bool:

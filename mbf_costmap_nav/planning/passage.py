@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.planning.outline_reach import outline_reach
+from mbf_costmap_nav.planning.outline_reach import where_outline_is_stuck
 from mbf_costmap_nav.planning.widest_disc import disc_gets_there, widest_disc
 
 
@@ -26,9 +26,9 @@ def too_narrow(costmap: Costmap, footprint: Footprint, start: Pose, goal: Pose, 
     """Why the outline gets from a pose nowhere within ``tolerance`` [m] of another; None if it may get there."""
     if not disc_gets_there(costmap, footprint, start, goal, tolerance):
         return TooNarrow(f"no way there is as wide as the robot, {2.0 * widest_disc(footprint)[2]:.2f} m")
-    reach = outline_reach(costmap, footprint, start, goal, tolerance)
-    if reach.place is None:
+    stuck = where_outline_is_stuck(costmap, footprint, start, goal, tolerance)
+    if stuck is None:
         return None
-    (x, y), (length, width) = reach.place, footprint.vertices.max(axis=0) - footprint.vertices.min(axis=0)
+    (x, y), (length, width) = stuck, footprint.vertices.max(axis=0) - footprint.vertices.min(axis=0)
     text = f"no way there leaves the robot, {length:.2f} m x {width:.2f} m, room to turn or to pass; it gets no farther"
     return TooNarrow(f"{text} than ({x:.2f}, {y:.2f})")

@@ -115,7 +115,7 @@ def _fill(
         group[f"{attribute_group}/{name}"] = np.asarray(values, dtype=np.float32).reshape(len(vertices), -1)
 
 
-def write_lvr2_map(path: Path, mesh_map: MeshMap, part: str = "mesh", layout: str = "mesh_io") -> None:
+def write_lvr2_map(path: Path, mesh_map: MeshMap, layout: str = "mesh_io") -> None:
     """Write a map with the costs of all its layers, in the caller's numbering as far as vertices come from the caller.
 
     Vertices that densifying or a repair added follow after them; merged and dropped ones are not in the file.
@@ -128,7 +128,7 @@ def write_lvr2_map(path: Path, mesh_map: MeshMap, part: str = "mesh", layout: st
     position = np.argsort(order, kind="stable")
     attributes: dict[str, NDArray[Any]] = {name: layer.costs[order] for name, layer in mesh_map.layers.items()}
     attributes["vertex_normals"] = mesh_map.vertex_normals[order]
-    write_lvr2_mesh(path, mesh_map.vertices[order], position[mesh_map.faces], attributes, part, layout)
+    write_lvr2_mesh(path, mesh_map.vertices[order], position[mesh_map.faces], attributes, layout=layout)
 
 
 @contextmanager

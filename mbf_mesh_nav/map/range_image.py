@@ -11,6 +11,8 @@ from mbf_mesh_nav.arrays import BoolArray, FloatArray
 BIN_ANGLE = np.radians(1.0)
 COLUMNS = round(2.0 * np.pi / BIN_ANGLE)
 ROWS = round(np.pi / BIN_ANGLE) + 1
+MARGIN = 0.1
+"""How far [m] behind a point the rays past it have to end."""
 NO_RANGE = 1e-6
 """A point this near [m] to its sensor stands for a ray without an answer; so do many drivers write it."""
 
@@ -32,11 +34,11 @@ class RangeImage:
         rows, columns, distances = self._bins(points[away])
         np.minimum.at(self._ranges, (rows, columns), distances)
 
-    def sees_through(self, points: FloatArray, margin: float = 0.1) -> BoolArray:
+    def sees_through(self, points: FloatArray) -> BoolArray:
         """Mask (m,) of points (m, 3) that rays passed by on their way to something farther.
 
         A point counts as seen through if there is a ray in its own bin and all rays in that bin and the eight around
-        it ended more than ``margin`` [m] behind the point. Asking for all of them keeps thin posts.
+        it ended more than ``MARGIN`` behind the point. Asking for all of them keeps thin posts.
         """
         rows, columns, distances = self._bins(points)
         nearest = np.full(len(points), np.inf)
@@ -45,7 +47,7 @@ class RangeImage:
                 around = self._ranges[np.clip(rows + row_step, 0, ROWS - 1), (columns + column_step) % COLUMNS]
                 nearest = np.minimum(nearest, around)
         observed = np.isfinite(self._ranges[rows, columns])
-        return np.asarray(observed & (nearest > distances + margin))
+        return np.asarray(observed & (nearest > distances + MARGIN))
 
     def _bins(self, points: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:
         rays = points - self.sensor_origin

@@ -80,9 +80,9 @@ class SnapshotAnswers(OutlinedMap):
     def snapshot(self) -> MeshSnapshot:
         """Return the current state; cheap, call it once per plan or control cycle."""
 
-    def to_input_order(self, values: NDArray[Any], missing: float = np.nan) -> NDArray[Any]:
-        """Bring per-vertex values (V, ...) into the caller's numbering; dropped vertices get ``missing``."""
-        result = np.full((len(self.input_to_internal), *values.shape[1:]), missing, dtype=np.float64)
+    def to_input_order(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Bring per-vertex values (V, ...) into the caller's numbering, as float64; dropped vertices get NaN."""
+        result = np.full((len(self.input_to_internal), *values.shape[1:]), np.nan, dtype=np.float64)
         kept = self.input_to_internal >= 0
         result[kept] = values[self.input_to_internal[kept]]
         return result

@@ -14,10 +14,8 @@ BORDER_SLACK = 0.05
 ON_EDGE = 1e-9
 
 
-def beyond_border(
-    topology: MeshTopology, places: FloatArray, location: Location, slack: float = BORDER_SLACK
-) -> BoolArray:
-    """Whether positions (n, 3) lie past a border of the surface, by more than ``slack`` [m] sideways.
+def beyond_border(topology: MeshTopology, places: FloatArray, location: Location) -> BoolArray:
+    """Whether positions (n, 3) [m] lie past a border of the surface, by more than ``BORDER_SLACK`` sideways.
 
     The surface point nearest to such a position lies on a border edge, and not below or above it. ``location`` is that
     of the places; those without a face are not beyond a border.
@@ -32,7 +30,7 @@ def beyond_border(
     on_border = (~np.roll(near, -2, axis=1) & (topology.face_neighbours[on_surface] < 0)).any(axis=1)
     in_vertex = near.sum(axis=1) == 1
     on_border |= in_vertex & (near & topology.border_vertices[topology.faces[on_surface]]).any(axis=1)
-    return np.asarray(on_border & (norm(sideways) > slack))
+    return np.asarray(on_border & (norm(sideways) > BORDER_SLACK))
 
 
 def on_surface(

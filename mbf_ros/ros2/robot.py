@@ -47,10 +47,6 @@ class Arrivals:
         """Note that a message has come."""
         self._heard[topic] = self._now()
 
-    def problem(self, limit: float) -> str:
-        """What is wrong with the first topic that has been silent for longer than ``limit`` [s]; empty if none has."""
-        return next(filter(None, self.problems(limit).values()), "")
-
     def problems(self, limit: float) -> dict[str, str]:
         """What is wrong with each topic, empty for one on which a message has come in the last ``limit`` [s]."""
         now = self._now()

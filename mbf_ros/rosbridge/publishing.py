@@ -22,6 +22,7 @@ from mbf_ros.rosbridge.protocol import frame
 from mbf_ros.rosbridge.topics import TopicTable
 from mbf_ros.rosbridge_robot.robot_state import RobotState
 
+PERIOD = 0.05  # s between two looks at the state
 STATUS_PERIOD = 1.0  # s between two lists of actionlib
 
 
@@ -42,8 +43,6 @@ class Publisher:
         Least time between two messages of a map [s].
     problems : callable
         What is wrong with each topic that must come from a robot.
-    period : float
-        Time between two looks at the state [s].
     """
 
     def __init__(
@@ -57,7 +56,6 @@ class Publisher:
         stamped_commands: bool = False,
         map_period: float = 1.0,
         problems: Callable[[], Mapping[str, str]] = dict,
-        period: float = 0.05,
     ) -> None:
         self._session, self._server = session, session.navigator.server
         self._topics, self._context, self._post, self._actionlib = topics, context, post, actionlib
@@ -69,7 +67,7 @@ class Publisher:
         self._outputs = {one.topic: node_topic(one) for one in self._messages.outputs}
         self._add_topics()
         self._robot_state = RobotState(session, topics, context, self._send) if simulated else None
-        self._ticker = Ticker(session.clock, session.events, self._tick, period, "rosbridge publisher")
+        self._ticker = Ticker(session.clock, session.events, self._tick, PERIOD, "rosbridge publisher")
 
     def close(self) -> None:
         """Publish no more."""

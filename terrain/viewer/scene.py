@@ -147,30 +147,23 @@ class RobotModel:
     ----------
     label_height : float
         Where the label floats [m].
-    node : str
-        Name of its node in the scene.
-    colour : Colour
-        Of its body.
     """
 
-    def __init__(
-        self, scene: Scene, shape: RobotShape, label_height: float, node: str = "/robot", colour: Colour = BODY
-    ) -> None:
-        self._shape = shape
-        self._frame = scene.add_frame(node, show_axes=False)
+    def __init__(self, scene: Scene, shape: RobotShape, label_height: float) -> None:
+        self._frame = scene.add_frame("/robot", show_axes=False)
         top = shape.height
-        _add_solid(scene, f"{node}/body", robot_body(shape), colour)
+        _add_solid(scene, "/robot/body", robot_body(shape), BODY)
         forward = np.array([0.6 * shape.footprint[:, 0].max(), 0.0])
         nose = prism(shape.footprint * np.array([0.25, 0.5]) + forward, top, top + 0.03)
-        _add_solid(scene, f"{node}/nose", nose, WHEEL)
+        _add_solid(scene, "/robot/nose", nose, WHEEL)
         width = 0.64 * shape.wheel_radius
         self._wheels = [
-            _add_wheel(scene, f"{node}/wheel_{k}", wheel, shape, width) for k, wheel in enumerate(shape.wheels)
+            _add_wheel(scene, f"/robot/wheel_{k}", wheel, shape, width) for k, wheel in enumerate(shape.wheels)
         ]
         stick = np.array([[[0.0, 0.0, shape.height], [0.0, 0.0, label_height]]])
-        scene.add_line_segments(f"{node}/stick", stick, colour, thickness=LINE_WIDTH, thickness_units="screen")
+        scene.add_line_segments("/robot/stick", stick, BODY, thickness=LINE_WIDTH, thickness_units="screen")
         place = (0.0, 0.0, 1.05 * label_height)
-        self._label = scene.add_label(f"{node}/label", "", position=place, anchor="bottom-center")
+        self._label = scene.add_label("/robot/label", "", position=place, anchor="bottom-center")
 
     def place(self, pose: FloatArray, wheel_angles: FloatArray, text: str) -> None:
         """Move to a pose (7,) x y z qx qy qz qw, turn the wheels to angles (k,) [rad], write the label."""

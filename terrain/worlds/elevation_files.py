@@ -100,13 +100,13 @@ def jacksboro(
     return terrain
 
 
-def read_dem(path: str | Path, max_samples: int = MAX_SAMPLES) -> Heightfield:
-    """Read an elevation model and fill its voids; parameters as in ``read_elevation``.
+def read_dem(path: str | Path) -> Heightfield:
+    """Read an elevation model and fill its voids; files as in ``read_elevation``.
 
     Raises TerrainFileError as that does, and where more than half of the raster is void.
     """
     try:
-        return _filled(read_elevation(path, max_samples))
+        return _filled(read_elevation(path))
     except ValueError as error:
         raise TerrainFileError(path, str(error)) from error
 

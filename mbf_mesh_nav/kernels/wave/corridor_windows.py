@@ -16,7 +16,7 @@ from mbf_mesh_nav.kernels.compiled import Count, inner_array_kernel, inner_kerne
 from mbf_mesh_nav.kernels.mesh.corners import corner_of
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, difference, dot, norm, row, set_row
 from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, next_round
-from mbf_mesh_nav.kernels.wave.funnel import pull_marked
+from mbf_mesh_nav.kernels.wave.funnel import pull_string
 
 _HALF_A_TURN = math.pi - 1e-9
 
@@ -73,7 +73,7 @@ def pull_turned(
     Parameters
     ----------
     corridor, points, marks
-        As ``pull_marked`` returns them.
+        As ``pull_string`` returns them.
     fan : (n,) int32
         The other faces.
     first, last : int
@@ -90,7 +90,7 @@ def pull_turned(
     while True:
         part = _part_with_fan(corridor, fan, first, last, low, high)
         ends = row(points, low), row(points, high)
-        pulled, pulled_marks = pull_marked(mesh.vertices, mesh.faces, part, ends[0], ends[1])
+        pulled, pulled_marks = pull_string(mesh.vertices, mesh.faces, part, ends[0], ends[1])
         begin, end = _group_before(marks, low), _group_behind(marks, high)
         bends_low = low == 0 or _bends(
             mesh, corridor, marks[low], begin - 1, low, row(points, begin - 1), row(pulled, Count(1))

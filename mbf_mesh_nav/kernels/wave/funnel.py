@@ -22,8 +22,10 @@ FlatPoint = tuple[float, float]
 
 
 @kernel
-def pull_string(vertices: FloatArray, faces: IntArray, corridor: IntArray, start: Vector, goal: Vector) -> FloatArray:
-    """Shortest path through a corridor of faces.
+def pull_string(
+    vertices: FloatArray, faces: IntArray, corridor: IntArray, start: Vector, goal: Vector
+) -> tuple[FloatArray, IntArray]:
+    """Shortest path through a corridor of faces, and where it touches vertices.
 
     Parameters
     ----------
@@ -35,19 +37,10 @@ def pull_string(vertices: FloatArray, faces: IntArray, corridor: IntArray, start
 
     Returns
     -------
-    (n + 1, 3) float64
-        Start, one point on each crossed edge, goal.
-    """
-    return pull_marked(vertices, faces, corridor, start, goal)[0]
-
-
-@kernel
-def pull_marked(
-    vertices: FloatArray, faces: IntArray, corridor: IntArray, start: Vector, goal: Vector
-) -> tuple[FloatArray, IntArray]:
-    """``pull_string``, and (n + 1,) int32 the vertex that each of its points is; -1 where it is none.
-
-    Start and goal, which lie anywhere, are marked as none.
+    points : (n + 1, 3) float64
+        Start, one point on each crossed edge, goal [m].
+    marks : (n + 1,) int32
+        The vertex that each of the points is; -1 where it is none. Start and goal, which lie anywhere, are none.
     """
     portal_count = len(corridor) - 1
     portals = np.empty((portal_count, 2), dtype=np.int32)  # vertices at the left and right end

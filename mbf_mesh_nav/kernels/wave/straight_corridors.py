@@ -23,7 +23,7 @@ from mbf_mesh_nav.kernels.wave.corridor_windows import (
     turned_corridor,
 )
 from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, fan_length, next_round
-from mbf_mesh_nav.kernels.wave.funnel import pull_marked
+from mbf_mesh_nav.kernels.wave.funnel import pull_string
 
 _LESS_THAN_HALF_A_TURN = math.pi - 1e-6
 _MAX_TURNS_A_FACE = 50  # tries; a bound, a traced corridor needs a turn for few of its faces
@@ -64,7 +64,7 @@ def straighten(
     corridor : (n,) int32
         The faces the path goes through.
     """
-    points, marks = pull_marked(mesh.vertices, mesh.faces, corridor, start, goal)
+    points, marks = pull_string(mesh.vertices, mesh.faces, corridor, start, goal)
     index, tries, is_changed = Count(0), _MAX_TURNS_A_FACE * len(corridor) if turn else Count(0), False
     has_turned = False
     while tries > 0 and len(corridor) > 1:
@@ -94,7 +94,7 @@ def straighten(
             has_turned = is_changed = True
             index = first - 1 if first > 1 else 0
     if has_turned:  # so that the points do not depend on the order of the turns
-        points, marks = pull_marked(mesh.vertices, mesh.faces, corridor, start, goal)
+        points, marks = pull_string(mesh.vertices, mesh.faces, corridor, start, goal)
     return points, corridor
 
 

@@ -38,10 +38,10 @@ def show(result: Mapping[str, Any]) -> Group:
     return Group(table_1(result), conditions_table(result), checks_table(result), criteria_table(result), verdict)
 
 
-def table_1(result: Mapping[str, Any], main: tuple[str, str] = ("S1", "B")) -> Table:
-    """Make the paper's table with ours beside it."""
-    a, b = (result["conditions"][name] for name in main)
-    table = Table("", "move_base", "MBF + tree", "ratio", f"ours: {main[0]}", f"ours: {main[1]}", "ratio [95 %]")
+def table_1(result: Mapping[str, Any]) -> Table:
+    """Make the paper's table with ours, conditions S1 and B, beside it."""
+    a, b = result["conditions"]["S1"], result["conditions"]["B"]
+    table = Table("", "move_base", "MBF + tree", "ratio", "ours: S1", "ours: B", "ratio [95 %]")
     for row in ("planner calls", "controller calls", "recovery calls", *RECOVERY_ROWS, "time"):
         paper = PAPER[row]
         ours = [of["recoveries"].get(row, 0) if row in RECOVERY_ROWS else round(of[row]) for of in (a, b)]

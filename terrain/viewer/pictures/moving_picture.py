@@ -53,7 +53,6 @@ class MovingPicture:
 
     def __init__(self, recording: Recording, size: tuple[int, int]) -> None:
         self._recording = recording
-        self._size = size
         self._fine = SMOOTHING * size[0], SMOOTHING * size[1]
         self._world, self._colours = _world(recording)
         self._has_storeys = bool(storeys(recording.ground))

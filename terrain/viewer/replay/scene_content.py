@@ -174,9 +174,9 @@ def _robot(
     }
 
 
-def thinned_looks(looks: Sequence[RecordedObjects], most: int = MAX_FRAMES) -> list[RecordedObjects]:
-    """About ``most`` of the looks, and all that see nothing: the arrows of the last look stay until the next one."""
-    stride = -(-len(looks) // most) or 1
+def thinned_looks(looks: Sequence[RecordedObjects]) -> list[RecordedObjects]:
+    """About ``MAX_FRAMES`` of the looks, and all that see nothing: arrows stay until the next look."""
+    stride = -(-len(looks) // MAX_FRAMES) or 1
     return [look for index, look in enumerate(looks) if index % stride == 0 or not len(look.rows)]
 
 

@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
 from mbf_mesh_nav.building.clouds.point_cloud import read_clouds
-from mbf_ros.bags.reading import open_bag
+from mbf_ros.bags.reading import BagError, open_bag
 from mbf_ros.bags.recorded_points import PointOptions, read_recorded_points, write_points
 from mbf_ros.bags.replay_options import ReplayOptions
 from mbf_ros.messages.geometry import MessageContext
@@ -30,6 +30,14 @@ def run(*arguments):
 def points_of(bag, chosen=EVERYTHING, **options):
     with open_bag(bag) as opened:
         return read_recorded_points(opened, chosen, ReplayOptions(**options))
+
+
+def test_more_points_than_memory_is_meant_for_are_refused_with_what_takes_fewer(tmp_path):
+    bag = make_bag(tmp_path, drive())
+    with open_bag(bag) as opened, pytest.raises(BagError, match="more than 2120 points; take fewer by --every or"):
+        read_recorded_points(opened, EVERYTHING, ReplayOptions(), max_points=21 * 101 - 1)
+    with open_bag(bag) as opened:
+        assert len(read_recorded_points(opened, EVERYTHING, ReplayOptions(), max_points=21 * 101).points) == 21 * 101
 
 
 @pytest.mark.parametrize("kind", ["ros1", "sqlite3", "mcap"])

@@ -14,7 +14,7 @@ from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.kernels.car.outline_flood import BITS, DEPTH, HEADINGS, covered_runs, flood, open_headings
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
-from mbf_costmap_nav.planning.outline_reach import outline_reach
+from mbf_costmap_nav.planning.outline_reach import where_outline_is_stuck
 
 CAR = Footprint([[0.75, 0.29], [-0.17, 0.29], [-0.17, -0.29], [0.75, -0.29]])
 ARROW = Footprint([[0.7, 0.0], [0.3, 0.25], [-0.2, 0.25], [-0.2, -0.25], [0.3, -0.25]])
@@ -97,7 +97,7 @@ def test_the_outline_gets_wherever_a_path_leads(make_plugin, footprint, angle):
         grid, (start, goal) = bend(width, angle)
         planner = make_plugin(HybridAStarPlanner, grid, footprint=footprint, min_turning_radius=0.8, max_states=60_000)
         found = planner.make_plan(PlanRequest(start, goal)).success
-        answers.append((found, outline_reach(grid, footprint, start, goal).gets_there))
+        answers.append((found, where_outline_is_stuck(grid, footprint, start, goal) is None))
     assert (True, False) not in answers
     assert answers[-1] == (True, True) and (footprint is ARROW or answers[0] == (False, False))
 
@@ -151,8 +151,8 @@ def test_a_bend_that_hardly_lets_the_car_pass_is_found_in_small_bins_before_all_
 
 def test_nothing_is_known_of_a_point_and_of_who_touches_something_and_a_tolerance_that_reaches_out_will_do():
     grid, (start, goal) = bend(0.6)
-    assert outline_reach(grid, Footprint([]), start, goal).gets_there
-    assert outline_reach(grid, CAR, Pose.planar(-3.0, 0.3), goal).gets_there
-    assert not outline_reach(grid, CAR, start, goal, 0.5).gets_there
-    assert outline_reach(grid, CAR, start, goal, 5.0).gets_there
-    assert outline_reach(grid, CAR, start, goal, math.inf).gets_there
+    assert where_outline_is_stuck(grid, Footprint([]), start, goal) is None
+    assert where_outline_is_stuck(grid, CAR, Pose.planar(-3.0, 0.3), goal) is None
+    assert where_outline_is_stuck(grid, CAR, start, goal, 0.5) is not None
+    assert where_outline_is_stuck(grid, CAR, start, goal, 5.0) is None
+    assert where_outline_is_stuck(grid, CAR, start, goal, math.inf) is None

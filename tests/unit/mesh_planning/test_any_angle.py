@@ -90,7 +90,7 @@ def test_the_taut_path_is_the_shortest_through_its_corridor(hills, seed):
     rng = np.random.default_rng(seed)
     corridor = random_corridor(hills, rng, 14)
     ends = hills.vertices[hills.faces[corridor[[0, -1]]]].mean(axis=1)
-    points = pull_string(hills.vertices, hills.faces, corridor, *(tuple(end) for end in ends))
+    points, _ = pull_string(hills.vertices, hills.faces, corridor, *(tuple(end) for end in ends))
     length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
     assert length == pytest.approx(shortest_length(hills, corridor, ends), rel=ROUNDING)
     np.testing.assert_array_equal(points[[0, -1]], ends)

@@ -7,7 +7,7 @@ from numba import njit
 from mbf_mesh_nav.kernels.mesh.corners import corner_of
 from mbf_mesh_nav.kernels.wave.corridor_windows import faces_round, path_length, turned_corridor
 from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, link_faces
-from mbf_mesh_nav.kernels.wave.funnel import pull_marked, pull_string
+from mbf_mesh_nav.kernels.wave.funnel import pull_string
 from mbf_mesh_nav.kernels.wave.straight_corridors import _free_side, straighten
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
@@ -15,7 +15,7 @@ from mbf_mesh_nav.map.mesh_map import MeshMap
 @njit
 def straightened_as_a_whole(mesh, corridor, start, goal):
     """``straighten`` with the whole string pulled for each turn that is tried."""
-    points, marks = pull_marked(mesh.vertices, mesh.faces, corridor, start, goal)
+    points, marks = pull_string(mesh.vertices, mesh.faces, corridor, start, goal)
     index, is_changed, tries = 0, False, 0
     while len(corridor) > 1:
         if index >= len(corridor) - 1:
@@ -38,7 +38,7 @@ def straightened_as_a_whole(mesh, corridor, start, goal):
         tries += 1
         fan = faces_round(mesh, corridor, vertex, first, last, side)
         turned = turned_corridor(corridor, fan, first, last)
-        pulled, pulled_marks = pull_marked(mesh.vertices, mesh.faces, turned, start, goal)
+        pulled, pulled_marks = pull_string(mesh.vertices, mesh.faces, turned, start, goal)
         if path_length(pulled, np.int64(0), np.int64(len(turned))) < path_length(
             points, np.int64(0), np.int64(len(corridor))
         ):
@@ -86,6 +86,6 @@ def test_strings_are_those_of_pulling_all_of_them_after_every_turn(ground, block
         if ground[0] != "flat":  # where several corridors are equally long, rounding decides
             np.testing.assert_array_equal(faces, whole_faces)
             assert points.tobytes() == whole.tobytes()
-        assert points.tobytes() == pull_string(mesh.vertices, mesh.faces, faces, *ends).tobytes()
+        assert points.tobytes() == pull_string(mesh.vertices, mesh.faces, faces, *ends)[0].tobytes()
         tries, longest = tries + turns, max(longest, len(corridor))
     assert tries > 30 and longest > 40

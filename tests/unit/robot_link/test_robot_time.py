@@ -65,7 +65,7 @@ def test_time_passes_as_the_topic_clock_says_and_a_jump_back_is_one():
     site.send("/clock", clock=duration(10.0))
     assert jumps == [pytest.approx(-90.5)] and clock.now() == pytest.approx(0.5)
     site.real.sleep(3.0)
-    assert "no message on /clock for 3.00 s" in site.arrivals.problem(1.0)
+    assert "no message on /clock for 3.00 s" in site.arrivals.problems(1.0)["/clock"]
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 3.0), st.floats(0.0, 0.49)), min_size=1, max_size=40), st.floats(0.5, 6.0))
