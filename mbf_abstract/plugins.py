@@ -281,7 +281,7 @@ class Motion(Protocol):
         """Send one command; False when the gate refused it (lease lost, paused)."""
 
     def sleep(self, seconds: float) -> bool:
-        """Wait; False as soon as the behaviour is to end."""
+        """Wait for so many seconds; False as soon as the behaviour is to end."""
 
 
 @dataclass(frozen=True)

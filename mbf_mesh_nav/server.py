@@ -197,7 +197,7 @@ class MeshNavigationServer(MapServer):
         return MeshContext(**vars(base), navigation_map=self.mesh_map, transforms=transforms, scans=self.scans)
 
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
-        """Heights of all surfaces at a place, the lowest free one first; see ``ground.ground_heights``."""
+        """Heights [m] of all surfaces at a place x, y [m], the lowest free one first; see ``ground.ground_heights``."""
         return ground_heights(self.mesh_map, x, y)
 
     @property

@@ -95,7 +95,10 @@ class OscillationDetector:
         self.stopwatch.restart()
 
     def check(self, pose: Pose, timeout: float, distance: float, angle: float) -> bool:
-        """Take in a new pose; True if the robot oscillates. A ``timeout`` of 0 switches the detector off."""
+        """Take in a new pose; True if the robot oscillates.
+
+        Limits in s, m and rad, as the class has them. A ``timeout`` of 0 switches the detector off.
+        """
         if self._reference is None or pose.distance_to(self._reference) >= distance:
             self.reset(pose)
         elif pose.angle_to(self._reference) >= angle:

@@ -49,7 +49,7 @@ class GatedMotion:
         return lease is not None and lease.send(command)
 
     def sleep(self, seconds: float) -> bool:
-        """Wait; False as soon as the behaviour is to end. Paused time does not count."""
+        """Wait for so many seconds; False as soon as the behaviour is to end. Paused time does not count."""
         watch = Stopwatch(self._runtime.clock)
         token = self._run.handle.cancel_token
         with self._condition:

@@ -22,7 +22,7 @@ def in_robot_frame(pose: Pose, point: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def arc_to(pose: Pose, point: NDArray[np.float64]) -> tuple[float, float]:
-    """Bearing [rad] of a point, and curvature [1/m] of the arc tangent to the robot's heading through it (left > 0)."""
+    """Bearing [rad] of a point (3,) [m], and curvature [1/m] of the arc tangent to the heading to it (left > 0)."""
     x, y, _ = in_robot_frame(pose, point)
     return math.atan2(y, x), 2.0 * float(y) / max(float(x * x + y * y), 1e-6)
 

@@ -29,7 +29,7 @@ def inside_polygon(points: NDArray[np.float64], corners: NDArray[np.float64]) ->
 
 
 def cross_products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Third component of the cross products of vectors (..., 2)."""
+    """Third component (...) float64 of the cross products of vectors (..., 2) in ``a`` and ``b``."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 

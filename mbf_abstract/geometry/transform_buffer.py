@@ -151,7 +151,7 @@ class TransformBuffer:
             return self._lookup(target, source, time, now, max_age)
 
     def can_transform(self, target: str, source: str, time: float | None = None) -> bool:
-        """Whether ``lookup`` would answer."""
+        """Whether ``lookup`` would answer at ``time`` [s], or at the newest common one."""
         try:
             self.lookup(target, source, time)
         except TransformError:
@@ -181,13 +181,13 @@ class TransformBuffer:
         return lambda: self._withdraw(request)
 
     def transform_pose(self, pose: Pose, target: str, time: float | None = None) -> Pose:
-        """Express a pose in ``target`` (at the newest time if none is given); raises TransformError."""
+        """Express a pose in ``target`` at ``time`` [s], the newest if none is given; raises TransformError."""
         if pose.frame_id == target:
             return pose
         return self.lookup(target, pose.frame_id, time).apply_to_pose(pose)
 
     def transform_path(self, path: Path, target: str, time: float | None = None) -> Path:
-        """Express a path in ``target``; only an unchanged frame keeps its guidance. Raises TransformError."""
+        """Express a path in ``target``, like a pose; only an unchanged frame keeps guidance. Raises TransformError."""
         if path.frame_id == target:
             return path
         return self.lookup(target, path.frame_id, time).apply_to_path(path)

@@ -28,7 +28,7 @@ class AvoidedPlace:
 
     @classmethod
     def ahead_of(cls, pose: Pose, radius: float) -> AvoidedPlace:
-        """Return the disc that begins half its radius behind a robot and ends one and a half radii ahead."""
+        """Return the disc of a radius [m] that begins half of it behind a robot and ends one and a half radii ahead."""
         x, y, z = (pose.position + 0.5 * radius * pose.rotation[:, 0]).tolist()
         return cls(replace(pose, position=(x, y, z)), radius)
 
@@ -54,7 +54,7 @@ class AvoidedPlaces:
         self._is_open = False  # for the rest of the goal
 
     def note(self, pose: Pose, radius: float) -> None:
-        """The robot is stuck at a pose; closes nothing yet."""
+        """The robot, of a radius [m], is stuck at a pose; closes nothing yet."""
         place = AvoidedPlace.ahead_of(pose, radius)
         if not any(known.centre.distance_to(place.centre) < 0.5 * radius for known in self._noted):
             self._noted.append(place)

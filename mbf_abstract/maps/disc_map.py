@@ -83,7 +83,10 @@ class DiscMap(NavigationMap):
     def find_valid_pose(
         self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
     ) -> PoseAnswer:
-        """Return the pose itself if the disc fits, else the nearest free candidate; the heading stays."""
+        """Return the pose itself if the disc fits, else the nearest free candidate within ``dist_tolerance`` [m].
+
+        The heading stays.
+        """
         check = self.pose_check(query)
         first = check(pose)
         if first.state < CellState.LETHAL:
@@ -101,7 +104,7 @@ class DiscMap(NavigationMap):
         return PoseAnswer(first.state, first.cost, None)
 
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
-        """Where the disc would come to touch an obstacle, or nearer to one it touches."""
+        """Where within ``duration`` [s] the disc would come to touch an obstacle, or nearer to one it touches."""
         if command.speed == 0.0:
             return ""
         step = min(STRIDE / command.speed, duration)

@@ -114,12 +114,12 @@ class LayeredMap(NavigationMap):
 
     @property
     def max_wait(self) -> float:
-        """The least that any layer with moving objects allows."""
+        """The shortest time [s] that any layer with moving objects allows."""
         limits = [layer.parameters for layer in self.layers.enabled]
         return min((limit.max_wait for limit in limits if isinstance(limit, ContactParameters)), default=math.inf)
 
     def speed_limit_at(self, pose: Pose, full_speed: float) -> float:
-        """The lowest that any layer states; raises ValueError where a layer states no speed that is one."""
+        """The lowest speed [m/s] that any layer states; raises ValueError where what a layer states is no speed."""
         limit = full_speed
         with self._lock:
             for layer in self.layers.enabled:

@@ -128,7 +128,7 @@ def radius_beyond(most: float) -> float:
 
 
 def kinds_of_steps(turning_radius: float) -> list[Step]:
-    """Steps from the origin: straight and in curves, forward and backward, and turns on the spot if it can."""
+    """Steps from the origin: straight and in curves, forward and backward; turns on the spot at a radius of 0 [m]."""
     radius = max(turning_radius, LEAST_RADIUS)
     steps = [_arc(gear, 0.0, STEP) for gear in (1, -1)]
     steps += [_arc(gear, turn / radius, radius * HEADING) for gear in (1, -1) for turn in (1.0, -1.0)]

@@ -114,7 +114,7 @@ class NavigationMap(ABC):
         return next((index for index, pose in enumerate(there) if check(pose).state is CellState.OUTSIDE), -1)
 
     def first_line_outside(self, positions: FloatArray) -> int:
-        """Index of the first position whose line to the next leads off the map; none (-1) does on a rectangle."""
+        """Index of the first of positions (n, 3) [m] whose line to the next leads off the map; -1 on a rectangle."""
         return -1
 
     @abstractmethod

@@ -114,7 +114,7 @@ class MapInterface(PluginHost):
         return (0.0,)
 
     def ground_pose(self, x: float, y: float, yaw: float = 0.0) -> Pose:
-        """Pose on the ground in the global frame: on the lowest free storey, at height 0 where there is no ground."""
+        """Pose in the global frame at (x, y) [m] and yaw [rad], on the lowest free storey; height 0 without ground."""
         heights = self.ground_heights(x, y)
         return Pose.planar(x, y, yaw, heights[0] if heights else 0.0, frame_id=self.config.parameters.global_frame)
 

@@ -50,7 +50,10 @@ class StandingRobot:
 def standing_server(
     cls: type[AbstractNavigationServer], config: Config, min_turning_radius: float = 0.0
 ) -> Iterator[AbstractNavigationServer]:
-    """Build a server around a robot that stands at the origin; it is closed at the end."""
+    """Build a server around a robot that stands at the origin; it is closed at the end.
+
+    ``min_turning_radius`` [m] is that of the robot it stands in for.
+    """
     with NavigationSession() as session:
         server = session.serve(cls, config, StandingRobot(session.clock, min_turning_radius))
         place_robot(server, Pose.planar(0.0, 0.0, frame_id=config.parameters.global_frame))

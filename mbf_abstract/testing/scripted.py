@@ -121,7 +121,7 @@ class ScriptedController(AbstractController, Scripted[ControlRequest]):
         return self._answer(request)  # type: ignore[no-any-return]
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
-        """Compare with the last pose of the path."""
+        """Compare with the last pose of the path; tolerances in m and rad."""
         goal = self.paths[-1][-1]
         return pose.distance_to(goal) <= dist_tolerance and pose.angle_to(goal) <= angle_tolerance
 

@@ -82,7 +82,7 @@ class LockstepScheduler:
             self.sleep(0.0)
 
     def wait(self, me: Participant, lock: threading.Lock, waiters: list[Participant], timeout: float | None) -> bool:
-        """Give ``lock`` back and wait among ``waiters`` in virtual time, then take it again; False on a time-out."""
+        """Give ``lock`` back, wait among ``waiters``, take it again; False after ``timeout`` [s] of virtual time."""
         self._forbid_waiting_with_lock(me, 1)
         with self.mutex:
             me.notified = False

@@ -34,7 +34,7 @@ class SimCondition:
         self._lock.release()
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait in virtual time; False on a time-out."""
+        """Wait in virtual time; False after ``timeout`` [s] of it."""
         return self._scheduler.wait(self._scheduler.current(), self._lock, self.waiters, timeout)
 
     def notify_all(self) -> None:
@@ -65,7 +65,7 @@ class SimThread:
         return self._alive
 
     def join(self, timeout: float | None = None) -> bool:
-        """Wait for its end in virtual time; return whether it has come."""
+        """Wait for its end, at most ``timeout`` [s] of virtual time; return whether it has come."""
         deadline = None if timeout is None else self._scheduler.now() + timeout
         with self._ended:
             while self._alive:

@@ -13,7 +13,7 @@ FloatArray = NDArray[np.float64]
 
 
 def resample(points: FloatArray, spacing: float) -> FloatArray:
-    """Insert points so that no segment is longer than ``spacing`` [m]; all given points are kept."""
+    """Insert points into points (n, 2) or (n, 3) [m] so that no segment is longer than ``spacing`` [m]; they stay."""
     if len(points) < 2:
         return points.copy()
     pieces = []
@@ -24,7 +24,7 @@ def resample(points: FloatArray, spacing: float) -> FloatArray:
 
 
 def circle_crossing(a: Sequence[float] | FloatArray, b: Sequence[float] | FloatArray, radius: float) -> FloatArray:
-    """Point where the segment from ``a`` to ``b`` crosses the circle of ``radius`` [m] around the origin.
+    """Point (2,) [m] where the segment from ``a`` to ``b`` crosses the circle of ``radius`` [m] around the origin.
 
     One end must lie inside (or on) the circle and the other outside (or on) it; the crossing is then unique, but for a
     segment that starts on the circle and runs through it: of two the one nearer to ``b`` is returned.

@@ -78,6 +78,6 @@ def footprint_costs(costmap: Costmap, footprint: Footprint, x: float, y: float, 
 
 
 def corners_in_cells(costmap: Costmap, footprint: Footprint, x: float, y: float, yaw: float) -> NDArray[np.float64]:
-    """Corners (n, 2) of a footprint at a pose, in cell coordinates."""
+    """Corners (n, 2) float64 [cells] of a footprint at a pose x, y [m], yaw [rad] of the costmap's frame."""
     corners = footprint.at(x, y, yaw) if len(footprint.vertices) >= 3 else np.array([[x, y]])
     return np.asarray(np.subtract(corners, (costmap.origin_x, costmap.origin_y)) / costmap.resolution)

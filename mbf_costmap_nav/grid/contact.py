@@ -87,6 +87,6 @@ def first_deeper_pose(
 
 
 def on_cells(costmap: Costmap, footprint: Footprint, x: float, y: float, yaw: float) -> FloatArray:
-    """Corners (n, 2) of the footprint at a pose, in cell coordinates."""
+    """Corners (n, 2) [cells] of the footprint at a pose x, y [m], yaw [rad] of the costmap's frame."""
     corners = footprint.at(x, y, yaw) if len(footprint.vertices) > 2 else np.array([[x, y]])
     return np.asarray((corners - (costmap.origin_x, costmap.origin_y)) / costmap.resolution)

@@ -52,7 +52,7 @@ class FootprintCheck:
         )
 
     def collides(self, costmap: Costmap, x: float, y: float, yaw: float) -> bool:
-        """Whether a lethal cell lies under the footprint."""
+        """Whether a lethal cell lies under the footprint at a pose x, y [m], yaw [rad]."""
         return self.cost(costmap, x, y, yaw) == LETHAL
 
     def touched(self, costmap: Costmap, x: float, y: float, yaw: float) -> tuple[float, float] | None:
@@ -68,7 +68,7 @@ class FootprintCheck:
         )
 
     def first_collision_of_turn(self, costmap: Costmap, poses: FloatArray) -> int:
-        """As ``first_collision``, for poses of a turn on the spot.
+        """As ``first_collision``, for poses (n, 3: x, y [m], yaw [rad]) of a turn on the spot.
 
         Samples that pass below every lethal cell on their circle are left out, most of the time all of them.
         """
@@ -114,7 +114,10 @@ def _nearest_lethal(costmap: Costmap, x: float, y: float, reach: float) -> float
 
 
 def footprint_samples(vertices: FloatArray, resolution: float) -> FloatArray:
-    """Points (n, 2) on the outline of a polygon, half a cell apart, and inside it, a cell apart."""
+    """Points (k, 2) [m] on the outline of a polygon (n, 2) [m], half a cell apart, and inside it, a cell apart.
+
+    ``resolution`` is the side of a cell [m].
+    """
     if len(vertices) < 3:
         return np.zeros((1, 2))
     outline = resample(np.vstack([vertices, vertices[:1]]), 0.5 * resolution)[:-1]

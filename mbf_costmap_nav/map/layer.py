@@ -148,7 +148,7 @@ class CostmapLayer(MapLayer):
 
     @abstractmethod
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
-        """Write this layer's costs into ``cells[box.slices]``; ``box`` lies on the grid."""
+        """Write this layer's costs into ``cells[box.slices]`` (height, width) uint8; ``box`` lies on the grid."""
 
     @property
     def forgets(self) -> bool:
@@ -181,7 +181,7 @@ class CostmapLayer(MapLayer):
         return full_speed
 
     def speed_limit_at(self, pose: Pose, full_speed: float) -> float:
-        """That of the pose's place."""
+        """The limit [m/s] at the pose's place."""
         return self.speed_limit(pose.x, pose.y, full_speed)
 
 
@@ -225,7 +225,7 @@ def shifted(cells: NDArray[CellType], dx: int, dy: int, fill: float) -> NDArray[
 
 
 def clear_cells(cells: NDArray[CellType], box: CellBox, inside: bool, value: float) -> None:
-    """Set the cells inside ``box`` to ``value``, or all others (``inside`` false). ``box`` lies on the grid."""
+    """Set the cells (height, width) inside ``box`` to ``value``, or all others (``inside`` false)."""
     if inside:
         if not box.empty:
             cells[box.slices] = value
@@ -237,7 +237,7 @@ def clear_cells(cells: NDArray[CellType], box: CellBox, inside: bool, value: flo
 
 
 def combine(cells: CellArray, layer_cells: CellArray, box: CellBox, method: CombinationMethod) -> None:
-    """Write a layer's cells of ``box`` into the costmap's; unknown ones change nothing under a maximum."""
+    """Write a layer's cells (height, width) of ``box`` into the costmap's; unknown ones never change a maximum."""
     old, new = cells[box.slices], layer_cells[box.slices]
     if method is CombinationMethod.OVERWRITE:
         np.copyto(old, new, where=new != UNKNOWN)

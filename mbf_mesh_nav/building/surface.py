@@ -134,11 +134,8 @@ def build_surface(
     is_outlier = isolated_points(points, 2.0 * cell, chosen.outlier_points)
     kept = points[~is_outlier] if is_outlier.any() else points
     if not len(kept):
-        raise MeshError(
-            "point cloud",
-            [f"all of its {len(points)} points are isolated"],
-            "Give their unit with --scale, or choose a larger --cell",
-        )
+        hint = "Give their unit with --scale, or choose a larger --cell"
+        raise MeshError("point cloud", [f"all of its {len(points)} points are isolated"], hint)
     on_step("surfaces")
     grid = Grid.around(kept, cell)
     rise = cell * float(tan(np.radians(chosen.max_slope))) + chosen.ground_thickness
@@ -157,9 +154,7 @@ def build_surface(
     faces = faces_of_patches(patches.heights, links, ~is_obstacle)
     is_kept = _is_large(patches, faces, chosen.least_area)
     if not is_kept.any():
-        flattest = "xyz"[int(np.argmin(np.ptp(points, axis=0)))]
-        hint = f"It is flattest along {flattest}: if that is up, choose --up {flattest}" if flattest != "z" else ""
-        raise MeshError("point cloud", [f"there is no surface of {chosen.least_area:g} m² in it"], hint)
+        raise MeshError("point cloud", [f"there is no surface of {chosen.least_area:g} m² in it"], _hint_on_up(points))
     is_used, is_small = _of_faces(patches, faces[is_kept]), _of_faces(patches, faces[~is_kept])
     faces = faces[is_kept]
     on_step("error")
@@ -170,6 +165,12 @@ def build_surface(
     return BuiltSurface(
         vertices, faces, patches, kept, is_outlier, is_obstacle, is_small & ~is_used, is_used, distances, *errors
     )
+
+
+def _hint_on_up(points: FloatArray) -> str:
+    """What to try where points (n, 3) [m] seem to lie on their side; empty where they do not."""
+    flattest = "xyz"[int(np.argmin(np.ptp(points, axis=0)))]
+    return f"It is flattest along {flattest}: if that is up, choose --up {flattest}" if flattest != "z" else ""
 
 
 def refuse_degenerate(points: FloatArray) -> None:

@@ -115,7 +115,7 @@ class MeshLayer(map_layer.MapLayer):
 
     @property
     def lethal_for_good(self) -> LethalArray:
-        """Read-only view of what is lethal however exact the map is: without what a margin for errors closes."""
+        """Read-only (V,) bool: what is lethal however exact the map is, without what a margin for errors closes."""
         return self.lethal
 
     @classmethod
@@ -137,10 +137,10 @@ class MeshLayer(map_layer.MapLayer):
 
     @abstractmethod
     def compute(self) -> tuple[CostArray, LethalArray]:
-        """Compute all values anew from mesh, parameters and inputs."""
+        """Compute costs (V,) float32 and lethal flags (V,) bool anew from mesh, parameters and inputs."""
 
     def recompute(self) -> IntArray:
-        """Compute everything anew and return the vertices whose cost or flag changed, ascending."""
+        """Compute everything anew and return the vertices (k,) int32 whose cost or flag changed, ascending."""
         if self.parameters.enabled:
             values: Any = self.compute()
             if not (isinstance(values, tuple) and len(values) == 2):
@@ -150,7 +150,7 @@ class MeshLayer(map_layer.MapLayer):
         return self.replace(np.zeros(count, dtype=np.float32), np.zeros(count, dtype=np.bool_))
 
     def replace(self, costs: CostArray, lethal: LethalArray) -> IntArray:
-        """Take over new values and return the vertices that changed, ascending.
+        """Take over costs (V,) and lethal flags (V,) and return the vertices (k,) int32 that changed, ascending.
 
         Values of other types are converted: a flag is any number but 0, a cost that is NaN is missing.
 
@@ -186,11 +186,11 @@ class MeshLayer(map_layer.MapLayer):
         """
 
     def update_from_inputs(self, changed: IntArray) -> IntArray:
-        """React to changed vertices of the inputs; return the own vertices that changed."""
+        """React to changed vertices (j,) int32 of the inputs; return the own ones (k,) int32 that changed."""
         return self.recompute() if len(changed) else NOTHING_CHANGED
 
     def update(self, now: float) -> IntArray:
-        """Take in the scans since the last update, forget what is too old at ``now`` [s]; return what changed."""
+        """Take in scans since the last update, forget what is too old at ``now`` [s]; return changed vertices (k,)."""
         return NOTHING_CHANGED
 
     @property
@@ -199,7 +199,7 @@ class MeshLayer(map_layer.MapLayer):
         return type(self).clear is not MeshLayer.clear
 
     def clear(self) -> IntArray:
-        """Forget everything sensed."""
+        """Forget everything sensed; return the vertices (k,) int32 that changed, ascending."""
         return NOTHING_CHANGED
 
     def clear_area(self, center: FloatArray, size: float, inside: bool) -> IntArray:

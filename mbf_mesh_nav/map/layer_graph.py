@@ -77,7 +77,7 @@ class LayerGraph(LayerStack[MeshLayer]):
         return _vertices(layer, layer.update_from_inputs(from_inputs)) if follows else NOTHING_CHANGED
 
     def set_parameters(self, name: str, parameters: LayerParameters) -> dict[str, IntArray]:
-        """Change a layer's parameters at run time and recompute what depends on them; returns what changed.
+        """Change a layer's parameters at run time and recompute what depends on them; returns as ``apply``.
 
         A combination reads the weights of its inputs, so a new ``combination_weight`` counts as a change of every
         vertex of the layer.
@@ -132,7 +132,7 @@ def _vertices(layer: MeshLayer, changed: object) -> IntArray:
 
 
 def union_of(sets: Sequence[IntArray]) -> IntArray:
-    """Vertices that are in any of the sets, each of which is ascending without repetitions, as is the result."""
+    """Vertices (k,) int32 in any of the sets, each of which is ascending without repetitions, as is the result."""
     filled = [changed for changed in sets if len(changed)]
     if len(filled) < 2:
         return filled[0] if filled else NOTHING_CHANGED

@@ -131,7 +131,7 @@ class MeshMap(SnapshotAnswers):
         return self._snapshot
 
     def changes_between(self, old_version: int, new_version: int) -> IntArray | None:
-        """Vertices whose cost or flag may differ between two snapshots; None if that is not remembered.
+        """Vertices (k,) int32 whose cost or flag may differ between two snapshots; None if that is not remembered.
 
         Nor is it if the first is the newer one. The last ``snapshot.REMEMBERED_CHANGES`` changes of the layers are;
         new layers or a new edge cost factor begin anew.

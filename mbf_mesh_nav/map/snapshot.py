@@ -151,7 +151,7 @@ class SnapshotSeries:
         return snapshot
 
     def changes_between(self, old_version: int, new_version: int) -> IntArray | None:
-        """Vertices that ``follow`` was given between two versions; None if some are not remembered."""
+        """Vertices (k,) int32 that ``follow`` was given between two versions; None if some are not remembered."""
         steps = [self._changes.get(version) for version in range(old_version + 1, new_version + 1)]
         known = [changed for changed in steps if changed is not None]
         return union_of(known) if len(known) == len(steps) else None

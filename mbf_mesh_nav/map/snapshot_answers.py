@@ -95,11 +95,11 @@ class SnapshotAnswers(OutlinedMap):
         return build_vertex_graph(self.topology, snapshot.costs, snapshot.edge_weights)
 
     def locate(self, points: ArrayLike, max_distance: float = np.inf) -> Location:
-        """Nearest surface points of many points, see ``SurfaceLocator.locate``."""
+        """Nearest surface points of points (n, 3), at most ``max_distance`` away [m]; see ``SurfaceLocator.locate``."""
         return self.locator.locate(points, max_distance)
 
     def locate_one(self, point: ArrayLike, max_distance: float = np.inf, hint_face: int = -1) -> SurfacePoint | None:
-        """Nearest surface point of one point or None, see ``SurfaceLocator.locate_one``."""
+        """Nearest surface point of a point (3,) [m], None if there is none; see ``SurfaceLocator.locate_one``."""
         return self.locator.locate_one(point, max_distance, hint_face)
 
     def places(self) -> MeshPlaces:
@@ -111,14 +111,17 @@ class SnapshotAnswers(OutlinedMap):
         return self.places().check_point
 
     def first_outside(self, positions: FloatArray) -> int:
-        """The first position past a border, or, the ends apart, farther above or below the surface than places are."""
+        """Index of the first of positions (n, 3) [m] that is past a border, -1 if none is.
+
+        So is, the ends apart, one that is farther above or below the surface than places are.
+        """
         location = self.locate(positions)
         outside = beyond_border(self.topology, positions, location)
         outside[1:-1] |= location.distances[1:-1] > OF_PLACES
         return int(np.argmax(outside)) if outside.any() else -1
 
     def first_line_outside(self, positions: FloatArray) -> int:
-        """The first line past a border; how far above or below the surface it leads does not matter.
+        """Index of the first of positions (n, 3) [m] whose line to the next leads past a border, at any height.
 
         Lines of up to one and a half edges of the mesh are not looked at: planners' paths have few others.
         """

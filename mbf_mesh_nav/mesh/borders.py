@@ -36,7 +36,7 @@ def beyond_border(topology: MeshTopology, places: FloatArray, location: Location
 def on_surface(
     topology: MeshTopology, locator: SurfaceLocator, position: FloatArray | tuple[float, ...], reach: float
 ) -> SurfacePoint | None:
-    """Return the surface point of a position at most ``reach`` [m] above or below it, None also past a border."""
+    """Return the surface point of a position (3,) at most ``reach`` [m] above or below it, None also past a border."""
     point = locator.locate_one(position, reach)
     if point is None or point.distance <= BORDER_SLACK or min(point.barycentric.tolist()) > ON_EDGE:
         return point  # too near, or inside a face: not past a border

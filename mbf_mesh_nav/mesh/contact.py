@@ -62,7 +62,10 @@ class Contact:
     def at(
         cls, mesh: MeshTopology, ranks: Float32Array, place: SurfacePoint, radius: float, travel: float
     ) -> Contact | None:
-        """The contact of a robot of a ``radius`` [m] that is about to drive ``travel`` [m]; None if it is in none."""
+        """The contact of a robot of a ``radius`` [m] that is about to drive ``travel`` [m]; None if it is in none.
+
+        ``ranks`` (V,) float32: how forbidden the vertices are, see ``MeshSnapshot.traversability_rank``.
+        """
         corners = ranks[mesh.faces[place.face]]
         if not corners.any():
             return None
@@ -108,7 +111,10 @@ class Contact:
 
 
 def contact_depth(mesh: MeshTopology, ranks: Float32Array, place: SurfacePoint, radius: float) -> float:
-    """How deep [m] a robot of a ``radius`` [m] lies in what it touches at a place; 0 where it touches nothing."""
+    """How deep [m] a robot of a ``radius`` [m] lies in what it touches at a place; 0 where it touches nothing.
+
+    ``ranks`` (V,) as in ``Contact.at``.
+    """
     contact = Contact.at(mesh, ranks, place, radius, 0.0)
     if contact is None:
         return LEAST if rank_at(mesh.vertices, mesh.faces, ranks, place.face, vector_of(place.point)) > 0.0 else 0.0

@@ -12,5 +12,5 @@ def vector_of(array: FloatArray) -> Vector:
 
 
 def position_text(position: FloatArray | Vector) -> str:
-    """Write a position for a message, in metres."""
+    """Write a position (3,) [m] for a message."""
     return f"({position[0]:.2f}, {position[1]:.2f}, {position[2]:.2f})"

@@ -44,7 +44,7 @@ def surface_point_at_vertex(mesh_map: MeshMap, vertex: int) -> SurfacePoint:
 
 
 def point_of_face(mesh_map: MeshMap, face: int, point: FloatArray) -> SurfacePoint:
-    """Return the surface point at a place in a face that is no wall; its coordinates are those of the plan view."""
+    """Return the surface point at a place (3,) [m] in a face that is no wall; it is placed in the plan view."""
     corners = mesh_map.vertices[mesh_map.faces[face], :2].tolist()
     areas = []
     for index in range(3):

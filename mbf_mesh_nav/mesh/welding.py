@@ -88,6 +88,6 @@ def first_of_group(pairs: NDArray[np.integer], count: int) -> IntArray:
 
 
 def rounding_distance(vertices: FloatArray) -> float:
-    """Distance [m] within which boundaries are joined unless the user gives another."""
+    """Distance [m] within which boundaries of vertices (V, 3) [m] are joined unless the user gives another."""
     extent = np.ptp(vertices, axis=0) if len(vertices) else np.zeros(3)
     return ROUNDING_SHARE * float(norm(extent))

@@ -133,6 +133,8 @@ class Corridor:
     def pass_vertices(self, positions: FloatArray, point_faces: IntArray) -> Piece:
         """The shortest geodesic found by passing single vertices on their other side; all costs apart.
 
+        ``positions`` (n, 3) [m] and ``point_faces`` (n,) int32 are those of the path to begin with.
+
         A path that leads along edges between blocked faces stays as it is.
         """
         corridor, pieces = link_faces(self._free, point_faces)
@@ -148,7 +150,7 @@ class Corridor:
         return self._snapshot.edge_cost_factor > 0.0 and bool((np.isfinite(costs) & (costs > 0.0)).any())
 
     def cost(self, positions: FloatArray, point_faces: IntArray) -> float:
-        """Length plus collected cost [m] of a path, see ``path_cost``."""
+        """Length plus collected cost [m] of a path of positions (n, 3) [m] in faces (n,), see ``path_cost``."""
         return cost_along(self._mesh_map, self._snapshot, positions, point_faces)
 
 

@@ -60,7 +60,7 @@ class HeadingLimits(Protocol):
         """Use at a point with a heading [rad]."""
 
     def driving(self, face: int, start: FloatArray, end: FloatArray, ends: list[FloatArray]) -> float:
-        """Greatest use on the straight line between two points of a face; ``ends`` are the normals at both."""
+        """Greatest use (1 = at the limit) on the line between two points (3,) [m]; ``ends`` are their normals."""
 
 
 class FootprintLimits:

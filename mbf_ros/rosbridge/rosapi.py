@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Protocol
 
 from mbf_abstract.config.findings import describe_value
@@ -10,8 +10,12 @@ from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message, MessageError, fields_of, full_name, known_types
 from mbf_ros.rosbridge.bridge import Bridge
 from mbf_ros.rosbridge.services import Service
+from mbf_ros.rosbridge.topics import TopicTable
 
 ANY_LENGTH, NO_LIST = 0, -1
+
+Calls = dict[str, Callable[[Message], Message]]
+"""What services do with a request, by the names of their types."""
 
 
 class Parameters(Protocol):
@@ -30,63 +34,91 @@ class Parameters(Protocol):
 def serve_rosapi(
     bridge: Bridge, parameters: Parameters, node: str, context: MessageContext, now: Callable[[], float]
 ) -> None:
-    """Add the services of rosapi to a bridge."""
-    topics, services, actions = bridge.topics, bridge.services.services, bridge.actions.actions
+    """Add the services of rosapi to a bridge.
 
-    def topic_lists(_: Message) -> Message:
-        types = topics.types()
-        return {"topics": list(types), "types": list(types.values())}
-
-    def node_details(_: Message) -> Message:
-        ours = [name for name in topics.types() if topics[name].is_ours]
-        inputs = [name for name in topics.types() if topics[name].on_message is not None]
-        return {"subscribing": inputs, "publishing": ours, "services": sorted(services)}
-
-    def publishers(request: Message) -> Message:
-        name = request.get("topic")
-        known = name in topics.types()
-        return {"publishers": [node] if known and topics[name].is_ours else []}  # type: ignore[index]
-
-    def subscribers(request: Message) -> Message:
-        name = request.get("topic")
-        known = name in topics.types()
-        return {"subscribers": [node] if known and topics[name].on_message is not None else []}  # type: ignore[index]
+    Parameters
+    ----------
+    node : str
+        Name of the navigator's node, the only one there is.
+    now : callable
+        Time [s] on the clock of the navigator.
+    """
+    services = bridge.services.services
+    reading: Calls = {
+        **_about_topics(bridge.topics, node),
+        **_about_services(services),
+        **_about_parameters(parameters),
+        **_about_types(),
+        "ActionServers": lambda _: {"action_servers": sorted({*bridge.actions.actions, *bridge.offered.offers})},
+        "Nodes": lambda _: {"nodes": [node]},
+        "NodeDetails": lambda _: {**_used_topics(bridge.topics), "services": sorted(services)},
+        "GetTime": lambda _: {"time": _of_both(context.time(now()))},
+    }
+    for name, call in reading.items():
+        services[f"/rosapi/{_snake(name)}"] = Service(f"rosapi_msgs/srv/{name}", call, changes_nothing=True)
 
     def set_parameter(request: Message) -> Message:
         parameters.set(_text(request, "name"), _text(request, "value"))
         return {"successful": True, "reason": ""}
 
-    reading: dict[str, Callable[[Message], Message]] = {
-        "Topics": topic_lists,
+    services["/rosapi/set_param"] = Service("rosapi_msgs/srv/SetParam", set_parameter)
+
+
+def _about_topics(topics: TopicTable, node: str) -> Calls:
+    def node_if(direction: str, request: Message) -> list[str]:
+        return [node] if request.get("topic") in _used_topics(topics)[direction] else []
+
+    def of_type(request: Message) -> list[str]:
+        wanted = full_name(str(request.get("type")))
+        return [name for name, kind in topics.types().items() if kind == wanted]
+
+    return {
+        "Topics": lambda _: {"topics": list(topics.types()), "types": list(topics.types().values())},
         "TopicType": lambda request: {"type": topics.types().get(str(request.get("topic")), "")},
-        "TopicsForType": lambda request: {
-            "topics": [name for name, kind in topics.types().items() if kind == full_name(str(request.get("type")))]
-        },
+        "TopicsForType": lambda request: {"topics": of_type(request)},
+        "Publishers": lambda request: {"publishers": node_if("publishing", request)},
+        "Subscribers": lambda request: {"subscribers": node_if("subscribing", request)},
+    }
+
+
+def _used_topics(topics: TopicTable) -> dict[str, list[str]]:
+    """Names of the topics that the navigator listens to, and of those that it publishes."""
+    names = list(topics.types())
+    return {
+        "subscribing": [name for name in names if topics[name].on_message is not None],
+        "publishing": [name for name in names if topics[name].is_ours],
+    }
+
+
+def _about_services(services: Mapping[str, Service]) -> Calls:
+    def of_type(request: Message) -> list[str]:
+        return sorted(name for name, one in services.items() if one.type == request.get("type"))
+
+    return {
         "Services": lambda _: {"services": sorted(services)},
         "ServiceType": lambda request: {"type": _type_of(services.get(str(request.get("service"))))},
-        "ServicesForType": lambda request: {
-            "services": sorted(name for name, one in services.items() if one.type == request.get("type"))
-        },
-        "ActionServers": lambda _: {"action_servers": sorted({*actions, *bridge.offered.offers})},
-        "Nodes": lambda _: {"nodes": [node]},
-        "NodeDetails": node_details,
-        "Publishers": publishers,
-        "Subscribers": subscribers,
-        "GetTime": lambda _: {"time": _of_both(context.time(now()))},
+        "ServicesForType": lambda request: {"services": of_type(request)},
+    }
+
+
+def _about_parameters(parameters: Parameters) -> Calls:
+    def value(request: Message) -> str:
+        default = str(request.get("default") or request.get("default_value", ""))
+        return parameters.get(_text(request, "name"), default)
+
+    return {
         "GetParamNames": lambda _: {"names": parameters.names()},
-        "GetParam": lambda request: {
-            "value": parameters.get(
-                _text(request, "name"), str(request.get("default") or request.get("default_value", ""))
-            )
-        },
+        "GetParam": lambda request: {"value": value(request)},
         "HasParam": lambda request: {"exists": request.get("name") in parameters.names()},
+    }
+
+
+def _about_types() -> Calls:
+    return {
         "MessageDetails": lambda request: {"typedefs": list(_typedefs(str(request.get("type")), set()))},
         "ServiceRequestDetails": lambda request: _details(f"{request.get('type')}_Request"),
         "ServiceResponseDetails": lambda request: _details(f"{request.get('type')}_Response"),
     }
-    for name, call in reading.items():
-        services[f"/rosapi/{_snake(name)}"] = Service(f"rosapi_msgs/srv/{name}", call, changes_nothing=True)
-    services["/rosapi/set_param"] = Service("rosapi_msgs/srv/SetParam", set_parameter)
 
 
 def _text(request: Message, name: str) -> str:

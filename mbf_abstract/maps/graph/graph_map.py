@@ -108,7 +108,10 @@ class GraphMap(LayeredMap, DiscMap):
         """Node (k,) next to each of the points (k, 2 or 3) [m]; -1 where there is no ground."""
 
     def first_line_outside(self, positions: FloatArray) -> int:
-        """The first line over a place without ground; gaps narrower than the robot's radius may be overlooked."""
+        """Index of the first of positions (n, 3) [m] whose line to the next leaves the ground; -1 if none.
+
+        Gaps narrower than the robot's radius may be overlooked.
+        """
         places, lines = places_between(positions, self.robot_radius)
         outside = self.nodes_at(places) < 0
         return int(lines[np.argmax(outside)]) if outside.any() else -1
@@ -118,7 +121,7 @@ class GraphMap(LayeredMap, DiscMap):
         """Add a scan to a memory of the map, beside the newest scan of each sensor; called in an update."""
 
     def seen_nodes(self) -> IntArray:
-        """Nodes with obstacles that sensors have seen: those below hits, up to the height of the robot."""
+        """Nodes (k,) int with obstacles that sensors have seen: those below hits, up to the height of the robot."""
         limits, hits = self.obstacles.parameters, self.obstacles.hits()
         nodes = self.nodes_at(hits)
         height = hits[:, 2] - self.nodes[nodes, 2]
@@ -204,7 +207,7 @@ class GraphMap(LayeredMap, DiscMap):
         return PlaceAnswer(CellState.INSCRIBED if touches else CellState.FREE, float(state.costs[node]))
 
     def candidates(self, x: float, y: float, dist_tolerance: float) -> FloatArray:
-        """All nodes on which the robot's centre may be."""
+        """Positions (k, 3) [m] of all nodes on which the robot's centre may be, wherever the pose asked for is."""
         return np.asarray(self.nodes[self.free_nodes()])
 
     def free_nodes(self) -> BoolArray:

@@ -52,6 +52,6 @@ class GraphMapServer(MapServer):
         return MapContext(**vars(base), navigation_map=self.navigation_map, transforms=transforms, scans=self.scans)
 
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
-        """Height of the node at a place, if there is one."""
+        """Height [m] of the node at a place (x, y) [m] of the global frame, if there is one."""
         node = self.navigation_map.node_at(x, y)
         return () if node < 0 else (float(self.navigation_map.nodes[node, 2]),)

@@ -66,7 +66,7 @@ class RobotBox(NamedTuple):
 
     @classmethod
     def disc(cls, radius: float) -> RobotBox:
-        """Box of a round robot."""
+        """Box of a round robot of a radius [m]."""
         return cls(0.0, 0.0, 0.0, 0.0, radius)
 
     @classmethod

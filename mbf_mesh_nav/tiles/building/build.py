@@ -82,8 +82,7 @@ class TileBuilder:
         layers = compute_layers(part_map, self._plan, "")
         # 2. The core comes first, otherwise all keep the order in which neighbours lie close in memory.
         is_core_face = topology.internal_to_input_faces < part.core_faces
-        is_core = np.zeros(topology.vertex_count, dtype=np.bool_)
-        is_core[topology.faces[is_core_face]] = True
+        is_core, is_around = (_corners_of(topology, faces) for faces in (is_core_face, ~is_core_face))
         order = np.concatenate([np.flatnonzero(is_core), np.flatnonzero(~is_core)])
         place = np.empty(len(order), dtype=np.int32)
         place[order] = np.arange(len(order), dtype=np.int32)
@@ -91,9 +90,7 @@ class TileBuilder:
         # 3. The vertex graph of the core.
         offsets, neighbours = _graph_of_core(topology, is_core, place)
         # 4. Vertices that cores of other tiles have, too, and the portals they form.
-        is_shared = np.zeros(topology.vertex_count, dtype=np.bool_)
-        is_shared[topology.faces[~is_core_face]] = True
-        shared = np.flatnonzero(is_shared[core]).astype(np.int32)
+        shared = np.flatnonzero(is_around[core]).astype(np.int32)
         vertices = topology.vertices[order]
         portals, portal_of = group_shared(vertices[shared], self._settings.cube)
         costs = np.array([layers[name].costs[core] for name in self.layers])
@@ -121,6 +118,13 @@ class TileBuilder:
     def _passing(self, tile: Tile, profile: CostProfile) -> np.ndarray[Any, np.dtype[np.float32]]:
         row = self.layers.index(profile.layer or self.default_layer)
         return costs_between_portals(tile, tile.costs[row], tile.lethal[row], profile)
+
+
+def _corners_of(topology: MeshTopology, is_chosen: BoolArray) -> BoolArray:
+    """Mask (V,) of the vertices of the chosen faces (F,)."""
+    mask = np.zeros(topology.vertex_count, dtype=np.bool_)
+    mask[topology.faces[is_chosen]] = True
+    return mask
 
 
 def _graph_of_core(topology: MeshTopology, is_core: BoolArray, place: IntArray) -> tuple[IntArray, IntArray]:

@@ -141,7 +141,7 @@ class TiledNavigationMap(TileQuestions):
         return [*super().configuration_warnings(), *filter(None, [large])]
 
     def first_outside(self, positions: FloatArray) -> int:
-        """The first position with no tile above or below it; a hole in a tile is not looked for."""
+        """Index of the first of positions (n, 3) [m] with no tile above or below it, or -1; holes do not count."""
         plan = positions[:, :2]
         outside = np.ones(len(plan), dtype=np.bool_)
         for key in self.tiled.index.tiles_in((*plan.min(axis=0), -np.inf, *plan.max(axis=0), np.inf)):
@@ -151,7 +151,7 @@ class TiledNavigationMap(TileQuestions):
         return int(np.argmax(outside)) if outside.any() else -1
 
     def first_line_outside(self, positions: FloatArray) -> int:
-        """The first line over a place without a tile."""
+        """Index of the first of positions (n, 3) [m] whose line to the next is over a place without a tile, or -1."""
         places, lines = places_between(positions, self.tiled.index.tile_size / PLACES_A_TILE)
         index = self.first_outside(places) if len(places) else -1
         return int(lines[index]) if index >= 0 else -1

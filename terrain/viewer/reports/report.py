@@ -106,22 +106,8 @@ def plots_svg(recording: Recording) -> str:
     figure = Figure(figsize=(10.0, 7.5), layout="constrained")
     FigureCanvasSVG(figure)
     axes = figure.subplots(4, 1, sharex=True)
-    times = recording.times
-    curves: list[tuple[str, list[tuple[str, FloatArray]]]] = [
-        ("speed [m/s]", [("commanded", recording.commands[:, 0]), ("measured", recording.twists[:, 0])]),
-        ("yaw rate [rad/s]", [("commanded", recording.commands[:, 2]), ("measured", recording.twists[:, 2])]),
-        ("tilt [°]", [("tilt", np.degrees(recording.tilt))]),
-        ("off the plan [m]", [("cross-track error", cross_track_errors(recording))]),
-    ]
-    for panel, (label, lines) in zip(axes, curves, strict=True):
-        for name, values in lines:
-            colour, width = ("#9db8e8", 3.0) if name == "commanded" else ("#e1550a", 1.2)
-            panel.plot(times, values, label=name, color=colour, linewidth=width)
-        panel.set_ylabel(label)
-        panel.grid(alpha=0.3)
-        panel.spines[["top", "right"]].set_visible(False)
-        if len(lines) > 1:
-            panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, fontsize=8, frameon=False)
+    for panel, (label, lines) in zip(axes, _curves(recording).items(), strict=True):
+        _draw_panel(panel, label, recording.times, lines)
     axes[2].set_ylim(top=max(axes[2].get_ylim()[1], LEAST_TILT_SCALE))
     axes[-1].set_xlabel("time [s]")
     figure.align_ylabels(axes)
@@ -130,6 +116,28 @@ def plots_svg(recording: Recording) -> str:
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     text = buffer.getvalue()
     return text[text.index("<svg") :]
+
+
+def _curves(recording: Recording) -> dict[str, dict[str, FloatArray]]:
+    """Values over time (n,) by the names of their lines, by the labels of their panels."""
+    commands, twists = recording.commands, recording.twists
+    return {
+        "speed [m/s]": {"commanded": commands[:, 0], "measured": twists[:, 0]},
+        "yaw rate [rad/s]": {"commanded": commands[:, 2], "measured": twists[:, 2]},
+        "tilt [°]": {"tilt": np.degrees(recording.tilt)},
+        "off the plan [m]": {"cross-track error": cross_track_errors(recording)},
+    }
+
+
+def _draw_panel(panel: Any, label: str, times: FloatArray, lines: Mapping[str, FloatArray]) -> None:
+    for name, values in lines.items():
+        colour, width = ("#9db8e8", 3.0) if name == "commanded" else ("#e1550a", 1.2)
+        panel.plot(times, values, label=name, color=colour, linewidth=width)
+    panel.set_ylabel(label)
+    panel.grid(alpha=0.3)
+    panel.spines[["top", "right"]].set_visible(False)
+    if len(lines) > 1:
+        panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, fontsize=8, frameon=False)
 
 
 def _asked(recording: Recording) -> str:

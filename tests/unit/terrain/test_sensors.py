@@ -1,9 +1,11 @@
 """Sensors: true where they should be, noisy by seed, and faulty on demand."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from mbf_abstract.geometry import Pose, Twist
 from terrain.physics.kinematic_world import KinematicWorld
@@ -11,7 +13,7 @@ from terrain.physics.robot_models import TURTLEBOT
 from terrain.physics.robots import WheeledRobot
 from terrain.physics.world import BulletWorld
 from terrain.sensors.lidar import Lidar, LidarModel, camera_directions, planar_directions, ring_directions
-from terrain.sensors.proprioception import Imu, Localization, WheelOdometry
+from terrain.sensors.proprioception import Imu, Localization, PoseNoise, WheelOdometry
 from terrain.sensors.rays import MovingRays, StaticRays
 from terrain.worlds.generate import fractal_terrain
 
@@ -83,6 +85,26 @@ def test_the_ray_tree_and_bullet_agree_on_rough_ground() -> None:
     assert np.abs(np.linalg.norm(points - origins, axis=1) - tree)[both].max() < 2e-3
 
 
+def test_a_lidar_sees_from_where_it_is_mounted_on_the_turned_robot() -> None:
+    with boxed_world() as world:
+        lidar = planar_lidar(world, Pose.planar(0.0, 1.0, math.pi / 2.0))
+        lidar.model = replace(lidar.model, position=(0.5, 0.2, 0.4))
+        scan = lidar.measure(0.0)
+    assert scan is not None and scan.origin == pytest.approx((-0.2, 1.5, 0.4))
+    assert np.allclose(scan.points[:, 0], 2.5, atol=1e-3)
+
+
+def test_hits_nearer_than_the_least_range_are_left_out_and_none_is_farther_than_the_largest() -> None:
+    with boxed_world() as world:
+        near = planar_lidar(world, Pose.planar(2.46, 0.0), min_range=0.1).measure(0.0)
+        far = planar_lidar(world, Pose.planar(0.0, 0.0), noise=0.1, max_range=2.55).measure(0.0)
+    assert near is not None and far is not None
+    distances = np.linalg.norm(near.points - near.origin, axis=1)
+    assert len(distances) and distances.min() >= 0.1 and len(near.ends) < 300
+    distances = np.linalg.norm(far.points - far.origin, axis=1)
+    assert distances.max() == pytest.approx(2.55) and distances.min() < 2.5
+
+
 def test_noise_has_its_spread_and_drop_out_its_share_by_seed() -> None:
     with boxed_world() as world:
         lidar = planar_lidar(world, Pose.planar(0.0, 0.0), noise=0.02, drop_out=0.2)
@@ -106,6 +128,7 @@ def test_a_lidar_can_be_silent_stale_or_wrong() -> None:
         bad = lidar.measure(0.3)
     assert good is not None and bad is not None and bad.stamp == 0.3
     assert np.linalg.norm(bad.points - bad.origin, axis=1).min() == pytest.approx(1.25, abs=0.01)
+    assert bad.hits.all() and len(bad.ends) == 360, "it sees something at half its range where there is nothing"
 
 
 def test_rays_into_an_empty_world_hit_nothing() -> None:
@@ -121,7 +144,10 @@ def test_the_imu_measures_roll_and_pitch() -> None:
     imu = Imu(PosedRobot(rolled, Twist((0.0, 0.0, 0.0), (0.1, 0.2, 0.3))), rng())
     tilts = [imu.measure(0.02 * k) for k in range(400)]
     assert np.mean([tilt.roll for tilt in tilts if tilt]) == pytest.approx(0.2, abs=1e-3)
-    assert np.mean([tilt.angular_velocity[2] for tilt in tilts if tilt]) == pytest.approx(0.3, abs=2e-3)
+    turning = np.array([tilt.angular_velocity for tilt in tilts if tilt])
+    assert turning.mean(axis=0) == pytest.approx((0.1, 0.2, 0.3), abs=2e-3)
+    errors = np.column_stack([turning, [(tilt.roll, tilt.pitch) for tilt in tilts if tilt]])
+    assert np.abs(np.corrcoef(errors.T) - np.eye(5)).max() < 0.15, "each has noise of its own"
 
 
 def test_perfect_wheel_odometry_follows_an_arc_and_a_real_one_drifts() -> None:
@@ -135,6 +161,16 @@ def test_perfect_wheel_odometry_follows_an_arc_and_a_real_one_drifts() -> None:
     truth = Pose.planar(radius * math.sin(yaw), radius * (1.0 - math.cos(yaw)), yaw)
     assert ideal.pose.distance_to(truth) < 1e-3 and ideal.pose.frame_id == "odom"
     assert 0.01 < drifted.pose.distance_to(truth) < 0.5
+
+
+def test_wheel_odometry_is_wrong_in_distance_and_in_turning_by_factors_of_their_own() -> None:
+    robot = PosedRobot(Pose.planar(0.0, 0.0), Twist.planar(0.5, 0.0, 0.25))
+    for errors in ({"scale_error": 0.3, "yaw_scale_error": 0.0}, {"scale_error": 0.0, "yaw_scale_error": 0.3}):
+        reading = WheelOdometry(robot, rng(), noise=0.0, **errors).measure(0.0)
+        assert reading is not None
+        velocity = reading.odometry.velocity
+        assert (velocity.vx == 0.5) is (errors["scale_error"] == 0.0)
+        assert (velocity.wz == 0.25) is (errors["yaw_scale_error"] == 0.0)
 
 
 def test_localisation_follows_the_robot_from_where_it_was_told_that_it_is() -> None:
@@ -162,6 +198,14 @@ def test_localisation_jumps_when_asked_to() -> None:
     after = localization.measure(0.1)
     assert before == Pose.planar(1.0, 2.0, 0.5) and after is not None
     assert (after.x, after.y, after.yaw) == pytest.approx((1.5, 2.0, 0.6)) and after.stamp == 0.1
+
+
+def test_a_localisation_errs_in_roll_and_pitch_about_the_robots_own_axes() -> None:
+    robot = PosedRobot(Pose((1.0, 2.0, 0.0), Pose.planar(0.0, 0.0, 1.2).orientation))
+    pose = Localization(robot, rng(), PoseNoise(tilt=0.2)).measure(0.0)
+    roll, pitch = 0.2 * rng().normal(size=6)[4:]
+    tilted = Rotation.from_euler("z", 1.2) * Rotation.from_euler("x", roll) * Rotation.from_euler("y", pitch)
+    assert pose is not None and pose.orientation == pytest.approx(tilted.as_quat(canonical=True))
 
 
 def test_a_depth_camera_looks_ahead_from_the_top_left() -> None:
