@@ -28,6 +28,7 @@ from mbf_abstract.executives.pacing import Delay, InBackground
 from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
 from mbf_abstract.executives.trees.by_motion import EndDrive, PickByMotion
 from mbf_abstract.executives.trees.options import TreeOptions
+from mbf_abstract.executives.trees.overtaking import IsHeldUp, Overtake
 from mbf_abstract.executives.watchdogs import MotorWatchdog, OscillationWatchdog, ProgressWatchdog
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome
@@ -110,14 +111,17 @@ def _second_planner(options: TreeOptions) -> Behaviour:
         return update
     if not options.wait:
         return _if_blocked(options, update)
-    # What moves is waited for: a path around where it is now would lead through where it goes.
+    # Who comes or crosses is waited for: a path around where they are now would lead through where they go.
     around = _detour("update path", options, planner, SECOND_PLANNER_SLOT)
     creeps = Do("robot stands?", lambda mission: mission.robot_is_slower_than(CREEPING))
     passing = _detour("pass it", options, planner, SECOND_PLANNER_SLOT)
     both_stand = Sequence("both stand", memory=True, children=[creeps, passing])
     for_standing: dict[Motion, Behaviour] = {Motion.WAITING: both_stand, Motion.PARKED: around}
     by_motion = PickByMotion("who blocks it?", for_standing, nobody=around, standing=STANDING)
-    return Selector("update", memory=True, children=[_if_blocked(options, by_motion), _beside(options, planner)])
+    past = Overtake("path past it", planner, SECOND_PLANNER_SLOT, options.longest_update, options.refiner)
+    overtake = Sequence("overtake", memory=True, children=[IsHeldUp(), past])
+    nodes = [_if_blocked(options, by_motion), overtake, _beside(options, planner)]
+    return Selector("update", memory=True, children=nodes)
 
 
 def _if_blocked(options: TreeOptions, update: Behaviour) -> Behaviour:

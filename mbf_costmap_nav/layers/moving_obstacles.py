@@ -26,7 +26,6 @@ from mbf_abstract.maps.tracking.moving_obstacles import (
     MovingObstaclesParameters,
     Sighting,
     TrackingLayer,
-    predicted_places,
 )
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, INSCRIBED, LETHAL, CellArray, CellBox, GridGeometry
@@ -51,6 +50,7 @@ class MovingObstaclesLayer(TrackingLayer, GridLayer):
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
         self._frame_id, self._static_maps = context.frame_id, context.static_maps
+        self._for_plans = not context.rolling_window
         self._objects = MovingObstacles(self.parameters, context.frame_id)
         self._inscribed_radius = 0.0
         self._predicted = EMPTY_BOX
@@ -120,15 +120,14 @@ class MovingObstaclesLayer(TrackingLayer, GridLayer):
         """Draw the predicted places instead of the last ones; return their box."""
         self.cells[self._predicted.slices] = self.default_value
         p, grid = self.parameters, self.geometry
-        objects = self.tracked_objects(now)
-        predicted = [predicted_places(known, p.prediction_time, p.prediction_cost) for known in objects]
-        if not any(len(costs) for _, costs in predicted):
+        predictions = self._objects.predictions(p, self._inscribed_radius, now, for_plans=self._for_plans)
+        if not predictions:
             return EMPTY_BOX
-        middles = np.concatenate([middles for middles, _ in predicted])
-        radii = np.repeat([known.radius for known in objects], [len(costs) for _, costs in predicted])
-        discs = np.column_stack([middles[:, :2] - (grid.origin_x, grid.origin_y), radii + self._inscribed_radius])
+        middles = np.concatenate([prediction.middles for prediction in predictions])
+        radii = np.repeat([each.radius for each in predictions], [len(each.costs) for each in predictions])
+        discs = np.column_stack([middles[:, :2] - (grid.origin_x, grid.origin_y), radii])
         discs /= grid.resolution
-        values = ((INSCRIBED - 1) * np.concatenate([costs for _, costs in predicted])).astype(np.uint8)
+        values = ((INSCRIBED - 1) * np.concatenate([prediction.costs for prediction in predictions])).astype(np.uint8)
         raise_discs(self.cells, discs, values)
         corners = np.concatenate([discs[:, :2] - discs[:, 2:], discs[:, :2] + discs[:, 2:]])
         return _box_of(np.floor(corners).astype(np.int64)).clipped(grid.box)

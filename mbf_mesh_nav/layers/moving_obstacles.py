@@ -30,9 +30,8 @@ from mbf_abstract.maps.tracking.moving_obstacles import (
     MovingObstacles,
     MovingObstaclesParameters,
     TrackingLayer,
-    predicted_places,
 )
-from mbf_abstract.maps.tracking.objects import TrackedObject
+from mbf_abstract.maps.tracking.prediction import Prediction
 from mbf_abstract.parameters import parameter, with_changes
 from mbf_mesh_nav.arrays import FloatArray, IntArray, sorted_once
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
@@ -183,19 +182,16 @@ class MovingObstaclesLayer(TrackingLayer, MeshLayer):
     def _predict(self, now: float) -> None:
         """Replace the predictions by those of ``now`` [s]."""
         self._prediction[self._predicted] = 0.0
-        self._predicted = union_of([self._raise_along(known) for known in self.tracked_objects(now)])
+        predictions = self._objects.predictions(self.parameters, self.parameters.inscribed_radius, now)
+        self._predicted = union_of([self._raise_along(prediction) for prediction in predictions])
 
-    def _raise_along(self, known: TrackedObject) -> IntArray:
+    def _raise_along(self, prediction: Prediction) -> IntArray:
         """Raise the predictions around the places where an object will be; return the vertices."""
-        p = self.parameters
-        middles, costs = predicted_places(known, p.prediction_time, p.prediction_cost)
-        if len(middles) == 0:
-            return NOTHING_CHANGED
+        middles, radius, costs = prediction
         on_surface = self.locator.locate(middles, SURFACE_DISTANCE)
         if on_surface.faces[0] < 0:
             return NOTHING_CHANGED
         mesh, points = self.topology, on_surface.points
-        radius = known.radius + p.inscribed_radius
         reach = float(norm(middles[-1] - middles[0])) + radius
         start = int(mesh.faces[on_surface.faces[0], np.argmax(on_surface.barycentric[0])])
         near = vertices_in_disc(mesh.vertices, mesh.neighbour_offsets, mesh.neighbours, start, points[0], reach)

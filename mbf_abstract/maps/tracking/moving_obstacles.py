@@ -1,17 +1,11 @@
-"""What the layers ``moving_obstacles`` of all maps share: scans in, tracked objects out, and how predictions cost.
+"""What the layers ``moving_obstacles`` of all maps share: scans in, tracked objects and predictions out.
 
 A layer takes the points out of a scan that stand on its ground and are not part of its static map; the rest is here.
 Scans wait for the next update of the map, as they may come while it is being updated.
-
-A prediction costs something in a disc around the place where an object will be, as large as the object and the robot's
-inscribed circle. The cost falls linearly with the time until then, from ``prediction_cost`` now to nothing at
-``prediction_time``. Where the object is now the obstacle layers mark what is seen; a prediction is never lethal,
-because it may be wrong.
 """
 
 from __future__ import annotations
 
-import math
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -26,23 +20,18 @@ from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.layers.layer import MapLayer
 from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.maps.tracking.contact import ContactParameters
-from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
+from mbf_abstract.maps.tracking.objects import TrackedObject
+from mbf_abstract.maps.tracking.prediction import NOWHERE, Prediction, PredictionParameters, predict
 from mbf_abstract.maps.tracking.tracker import Tracker, TrackingParameters
 from mbf_abstract.parameters import parameter
 
 MAX_WAITING = 64
 """Scans that may wait for an update; older ones are dropped."""
-PREDICTION_STEP = 0.1
-"""Longest time [s] between two predicted places."""
-LEAST_RADIUS = 0.05
-"""Predicted places of smaller objects [m] are as far apart as those of such a one."""
-
 ObstaclePoints = Callable[[RangeScan], FloatArray]
 """The points (n, 3) [m] of a scan that may be objects, on the ground below them."""
 
 
-class MovingObstaclesParameters(TrackingParameters, ContactParameters):
+class MovingObstaclesParameters(TrackingParameters, PredictionParameters):
     """Parameters of the layers ``moving_obstacles``, beside those of all layers."""
 
     sources: tuple[str, ...] = parameter(
@@ -63,12 +52,6 @@ class MovingObstaclesParameters(TrackingParameters, ContactParameters):
     )
     expected_update_rate: float = parameter(
         1.0, "Longest allowed time between two scans of a sensor; 0 switches the check off.", unit="s", ge=0.0
-    )
-    prediction_time: float = parameter(
-        2.0, "How far ahead the places of moving objects cost something; 0 = no costs.", unit="s", ge=0.0, le=20.0
-    )
-    prediction_cost: float = parameter(
-        0.8, "Cost of the place where a moving object is now, as a share of that of an obstacle.", ge=0.0, lt=1.0
     )
     clear_trails: bool = parameter(True, "Free what obstacle layers keep where a moving object was seen and left.")
 
@@ -103,6 +86,7 @@ class MovingObstacles:
         self._watches = {name: SourceWatch(name) for name in parameters.sources}
         self._waiting: deque[RangeScan] = deque(maxlen=MAX_WAITING)
         self._lock = threading.Lock()  # of the tracker
+        self._sensor = NOWHERE  # where the last scan was taken [m]
 
     def insert_scan(self, scan: RangeScan) -> None:
         """Keep a scan for the next update; may be called on any thread."""
@@ -120,6 +104,7 @@ class MovingObstacles:
                 numbers = self._tracker.insert(points, scan.origin, scan.stamp)
                 of_moving = self._tracker.are_moving(numbers)
             self._watches[scan.source].used()
+            self._sensor = scan.origin
             yield Sighting(points, of_moving)
 
     def objects(self, now: float) -> tuple[TrackedObject, ...]:
@@ -131,6 +116,17 @@ class MovingObstacles:
         """The objects before which the robot must stop, at ``now`` [s]; see ``Tracker.objects``."""
         with self._lock:
             return self._tracker.objects(now, guarded=True)
+
+    def predictions(
+        self, parameters: MovingObstaclesParameters, inscribed_radius: float, now: float, *, for_plans: bool = True
+    ) -> list[Prediction]:
+        """Where the moving objects will be from ``now`` [s] on, for a robot of this radius [m].
+
+        With ``for_plans`` also for as long as it takes to pass them; a controller would only be slow in such costs.
+        """
+        sensor = self._sensor if for_plans else NOWHERE
+        found = (predict(known, parameters, inscribed_radius, sensor) for known in self.objects(now))
+        return [prediction for prediction in found if len(prediction.costs)]
 
     def stale_reason(self, now: float, limit: float) -> str:
         """Which sensor is silent for longer than ``limit`` [s], or has sent nothing since a clearing."""
@@ -181,25 +177,3 @@ def _within(scan: RangeScan, limits: MovingObstaclesParameters) -> RangeScan:
     distances = norm(scan.ends - scan.origin) if len(scan.ends) else np.zeros(0)
     near = scan.hits & (distances > limits.obstacle_min_range) & (distances <= limits.obstacle_max_range)
     return RangeScan(scan.source, scan.frame_id, scan.origin, scan.ends[near], scan.hits[near], scan.stamp)
-
-
-def predicted_places(
-    known: TrackedObject, prediction_time: float, prediction_cost: float
-) -> tuple[FloatArray, FloatArray]:
-    """Where an object will be within ``prediction_time`` [s], and what that costs.
-
-    Returns
-    -------
-    middles : (n, 3) float64
-        [m], in order of time, at most an object's radius apart; none of an object that does not move.
-    costs : (n,) float64
-        From ``prediction_cost`` at the first one towards 0 at the end of the time.
-    """
-    if known.motion is not Motion.MOVING or prediction_time == 0.0:
-        return np.zeros((0, 3)), np.zeros(0)
-    steps = math.ceil(prediction_time / min(PREDICTION_STEP, max(known.radius, LEAST_RADIUS) / max(known.speed, 1e-6)))
-    shares = np.arange(steps) / steps
-    middles = np.empty((steps, 3))
-    middles[:, 0], middles[:, 1] = known.position_in(shares * prediction_time)
-    middles[:, 2] = known.z
-    return middles, prediction_cost * (1.0 - shares)

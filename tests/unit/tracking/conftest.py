@@ -71,9 +71,10 @@ class Hall:
         return float(costs[near])
 
 
-def costmap_hall(**parameters):
+def costmap_hall(rolling=False, **parameters):
     cells = np.zeros((80, 100), dtype=np.uint8)
     cells[round(WALL_Y / 0.1), :] = LETHAL
+    moves = {"rolling_window": True, "width": 8.0, "height": 8.0, "resolution": 0.1} if rolling else {}
     entries = [("walls", "static"), ("obstacles", "obstacle"), ("moving", "moving_obstacles")]
     source = {"raytrace_max_range": 0.1, "obstacle_max_range": 10.0, "observation_persistence": 30.0}
     blocks = {
@@ -81,7 +82,7 @@ def costmap_hall(**parameters):
         "moving": {"sources": ["lidar"], **parameters},
     }
     return build_layered_costmap(
-        CostmapParameters(robot_radius=0.2, layers=tuple(LayerEntry(name=n, type=t) for n, t in entries)),
+        CostmapParameters(robot_radius=0.2, layers=tuple(LayerEntry(name=n, type=t) for n, t in entries), **moves),
         blocks,
         static_map=Costmap(cells, 0.1),
     )
@@ -107,6 +108,12 @@ def make_hall(request):
     """Make the map with parameters of the layer ``moving``."""
     build = costmap_hall if request.param == "costmap" else mesh_hall
     return lambda **parameters: Hall(request.param, build(**parameters))
+
+
+@pytest.fixture
+def make_rolling_hall():
+    """Make the costmap as one that moves with the robot."""
+    return lambda **parameters: Hall("costmap", costmap_hall(rolling=True, **parameters))
 
 
 @pytest.fixture

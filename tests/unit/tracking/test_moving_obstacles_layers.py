@@ -36,6 +36,49 @@ def test_a_prediction_is_as_wide_as_the_object_and_the_robot(hall):
     assert hall.cost(ahead, seen.y + aside + 0.15) == 0.0
 
 
+PASSED = {"max_vel_x": 1.2}  # m/s; the sensor stands at (5, 1), so this robot would come near in time
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.5), (0.3, 0.4)])
+def test_who_goes_slowly_away_from_the_robot_costs_for_as_long_as_it_takes_to_pass(make_hall, velocity):
+    hall = make_hall(**PASSED)
+    hall.watches(5.0, 2.0, *velocity)
+    (seen,) = hall.objects
+    for seconds in (2.5, 4.0):
+        x, y = seen.position_in(seconds)
+        assert hall.cost(x, y) > 0.0
+    x, y = seen.position_in(2.5)
+    aside = seen.radius + 0.2 + 0.1 + 0.5 * seen.speed  # both radii, and how near the guard lets the robot drive
+    across = -seen.vy / seen.speed, seen.vx / seen.speed
+    assert hall.cost(x + aside * across[0], y + aside * across[1]) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("place", "velocity", "changes"),
+    [
+        ((5.0, 4.5), (0.0, -0.5), {}),  # comes
+        ((5.0, 2.0), (0.0, 0.5), {"max_vel_x": 0.5}),  # as fast as the robot
+        ((5.0, 2.0), (0.0, 0.5), {"passing_time": 0.0}),
+        ((2.5, 1.5), (0.5, 0.0), {}),  # the robot is ahead of it
+        ((5.0, 5.0), (0.0, 0.4), {"max_vel_x": 0.6}),  # far away
+    ],
+)
+def test_nobody_else_costs_longer_than_the_prediction_time(make_hall, place, velocity, changes):
+    hall = make_hall(**{**PASSED, **changes})
+    hall.watches(*place, *velocity, scans=10)
+    (seen,) = hall.objects
+    x, y = seen.position_in(2.0 + (seen.radius + 0.3) / seen.speed)
+    assert hall.cost(x, y) == 0.0
+
+
+def test_a_map_that_moves_with_the_robot_is_for_controllers_and_has_no_such_costs(make_rolling_hall):
+    hall = make_rolling_hall(**PASSED)
+    hall.watches(5.0, 2.0, 0.0, 0.5)
+    (seen,) = hall.objects
+    near, far = seen.position_in(1.0), seen.position_in(2.0 + (seen.radius + 0.3) / seen.speed)
+    assert hall.cost(*near) > 0.0 == hall.cost(*far)
+
+
 def test_who_stands_has_no_predictions_and_stays_an_obstacle(hall):
     for _ in range(10):
         hall.sees((3.0, 4.0))
