@@ -8,6 +8,7 @@ takes, so that a plan leads past. When not: for who stands (``detours.py``), or 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.executives.nodes import Leaf
 from mbf_abstract.executives.trees.by_motion import ALONG, MARGIN, first_in_the_way
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.goals.result_types import ActionResult, GetPathResult
 from mbf_abstract.maps.queries import CellState
@@ -36,7 +38,7 @@ MOST = 6
 """After so many of these in a row the robot stays behind as where there was no room: it does not get past."""
 BESIDE = 1.0
 """Who was begun to be passed is so until the path keeps farther [m] from there than this."""
-SIDEWAYS = (0.6, -0.6, 0.9, -0.9, 1.2, -1.2)
+SIDEWAYS = (0.6, 0.9, 1.2, 1.8, 2.4)
 """So far [m] beside the path room to pass is looked for, to the left and to the right."""
 KEPT = 0.3
 """Beside somebody who moves a robot that keeps this distance [m] is hardly slowed down, see ``tracking/contact.py``."""
@@ -81,7 +83,9 @@ class IsHeldUp(Leaf):
         first = first_in_the_way(self.mission, AHEAD, MARGIN) if speed <= HELD_UP * self._pace else None
         if first is None or first.along < ALONG or not self._is_slow(first.by, HELD_UP):
             return None
-        return first.by if has_room_beside(self.mission, first) else None
+        with suppress(TransformError, RobotStateError):
+            return first.by if has_room_beside(self.mission, first) else None
+        return None
 
     def _is_slow(self, known: TrackedObject, share: float) -> bool:
         return known.motion is Motion.MOVING and known.speed <= share * self._pace
@@ -94,12 +98,11 @@ def has_room_beside(mission: MissionContext, first: Blockage) -> bool:
     looks = np.arange(0.0, min(first.distance + AHEAD, path.length), SPACING)
     poses = [path[index] for index in np.searchsorted(lengths, looks).tolist()]
     queries = mission.navigator.server.queries
-    for shift in SIDEWAYS:
+    for shift in (side * distance for distance in SIDEWAYS for side in (1.0, -1.0)):
         beside = Path.from_poses([_beside(pose, shift) for pose in poses], path.stamp)
-        met = queries.what_blocks(beside, margin=KEPT)
-        if all(other.by.number != first.by.number for other in met):
-            if queries.check_path(beside).state is CellState.FREE:
-                return True
+        met = any(other.by.number == first.by.number for other in queries.what_blocks(beside, margin=KEPT))
+        if not met and queries.check_path(beside).state is CellState.FREE:
+            return True
     return False
 
 
@@ -150,13 +153,18 @@ class Overtake(UpdatePath):
 
     def take_result(self, result: ActionResult) -> None:
         """Keep the path of a success on which nobody is met who moves now."""
-        if isinstance(result, GetPathResult) and result.path is not None:
-            met = self.mission.navigator.server.queries.what_blocks(result.path, margin=MARGIN)
-            if any(blockage.by.motion is Motion.MOVING for blockage in met):
-                self.feedback_message = f"no room to pass object {met[0].by.number}"
-                return
+        if isinstance(result, GetPathResult) and result.path is not None and self._meets_somebody(result.path):
+            self.feedback_message = "no room to pass"
+            return
         super().take_result(result)
         self._taken = self.mission.plan is result
+
+    def _meets_somebody(self, path: Path) -> bool:
+        """Whether somebody who moves is on a path, or the map cannot say."""
+        with suppress(TransformError):
+            met = self.mission.navigator.server.queries.what_blocks(path, margin=MARGIN)
+            return any(blockage.by.motion is Motion.MOVING for blockage in met)
+        return True
 
     def is_too_long(self, length: float, present: float) -> bool:
         """Passing costs a few metres; more is not worth it."""

@@ -7,6 +7,7 @@ import pytest
 from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.maps.tracking.blocking import Blockage
 from mbf_abstract.maps.tracking.objects import Motion
@@ -85,3 +86,16 @@ def test_a_path_that_does_not_keep_clear_of_them_is_not_taken_nor_asked_for_agai
     session = behind(slow_one())
     assert len(plans_of(session)) == 1  # of straight_plan, which leads through them
     assert {request.start.y for request in session.planner.requests} == {0.0}
+
+
+def test_where_the_map_cannot_say_who_is_on_a_path_none_is_taken(behind, monkeypatch):
+    session = behind(slow_one())
+    asked = session.server.queries.what_blocks
+
+    def what_blocks(path, within_time=2.0, margin=0.0):
+        if len(session.planner.requests) > 1:
+            raise TransformError("no transform from map to odom")
+        return asked(path, within_time, margin)
+
+    session.server.queries.what_blocks = what_blocks
+    assert len(plans_of(session)) == 1
