@@ -10,6 +10,7 @@ from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.maps.avoided_places import AvoidedPlace
+from mbf_abstract.testing.conformance.rig import Box
 from mbf_abstract.testing.conformance.site import site
 
 pytestmark = pytest.mark.usefixtures("one_core")
@@ -25,6 +26,16 @@ TREE = TreeOptions(
 @pytest.fixture(params=["costmap", "mesh", "elevation_grid", "occupancy_octree"])
 def make_avoiding(request, backends):
     return backends[request.param]
+
+
+@pytest.mark.parametrize("backend", ["costmap", "mesh"])
+def test_what_stands_on_a_path_is_named_and_poses_off_a_map_are_nothing(backends, backend):
+    with site(backends[backend]) as made:
+        obstacle_along = made.server.obstacle_along
+        made.place(Box(3.0, 3.5, 3.5, 4.5))
+        assert obstacle_along(made.path((2.0, 4.0), (2.4, 4.0), (2.4, 7.0))) == ""
+        assert obstacle_along(made.path((2.0, 4.0), (4.0, 4.0))) == "pose 7 of the path (2.70, 4.00, 0.00) is blocked"
+        assert obstacle_along(made.path((2.0, 4.0), (-40.0, 4.0))) == ""
 
 
 def least_distance(path):

@@ -17,7 +17,6 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(r"^ *```sh\n(.*?)^ *```", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"`(mbf(?: [^`\n]+)?)`")
-WITH_EXTRAS = re.compile(r"^(?:\.|mbf-flex)\[(.*)\]$")
 VARIABLE = re.compile(r"^\w+=")
 PLACEHOLDER = re.compile(r"^[A-Z]+(\.\w+)?$|\.\.\.|/NAME\.yaml$")  # NAME, SCAN.las
 OTHER_PROGRAMS = {".", "echo", "journalctl", "make", "pip", "podman", "pytest", "python", "python3", "ros2", "sudo"}

@@ -67,6 +67,20 @@ def test_a_plugin_loaded_by_its_type_serves_goals_with_its_parameters(session):
     assert session.server.plugins.names(PluginKind.PLANNER) == ["planner", "refuser"]
 
 
+def test_each_plugin_draws_numbers_of_its_own_and_the_same_ones_in_every_session(make_session):
+    def drawn(session, name):
+        session.server.load_plugin_type(PluginKind.PLANNER, name, "mbf_abstract.testing.scripted:ScriptedPlanner")
+        return session.plugin(name, ScriptedPlanner).rng.random()
+
+    first, again = make_session(), make_session()
+    assert drawn(first, "one") == drawn(again, "one") != drawn(first, "other")
+
+
+@pytest.mark.parametrize(("min_vel_x", "may_reverse"), [(-0.1, True), (0.0, False)])
+def test_a_plugin_knows_whether_its_robot_may_drive_backward(make_session, min_vel_x, may_reverse):
+    assert make_session(min_vel_x=min_vel_x).planner.may_reverse is may_reverse
+
+
 def test_a_reloaded_plugin_runs_the_new_source_with_the_present_parameters(session, source):
     session.server.set_plugin_parameters(PluginKind.PLANNER, "refuser", code=80)
     source(SOURCE.replace("VERSION", "number two"))

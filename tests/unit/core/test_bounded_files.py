@@ -45,6 +45,15 @@ def member(header: bytes, magic: bytes = b"\x93NUMPY\x01\x00") -> bytes:
     return magic + len(header).to_bytes(2, "little") + header
 
 
+def test_an_array_of_less_than_nothing_makes_no_room_for_one_that_is_too_large(tmp_path):
+    with zipfile.ZipFile(tmp_path / "both.npz", "w") as archive:
+        for name, count in (("less", -1_000_000), ("large", 1_000_000)):
+            header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({count},)}}\n"
+            archive.writestr(f"{name}.npy", member(header.encode()))
+    with pytest.raises(ArrayFileError, match=r"^'less.npy' has the shape \(-1000000,\)$"):
+        read_arrays(tmp_path / "both.npz", 1000)
+
+
 @pytest.mark.parametrize(
     "content",
     [
@@ -78,5 +87,5 @@ def test_damage_anywhere_in_the_file_is_one_kind_of_error(tmp_path):
         (tmp_path / "damaged.npz").write_bytes(content[: rng.integers(1, len(content) + 1)])
         try:
             read_arrays(tmp_path / "damaged.npz", 10_000)
-        except ArrayFileError:
-            pass
+        except ArrayFileError as error:
+            assert "\n" not in str(error)

@@ -3,7 +3,7 @@ from pathlib import Path
 from typing import Literal
 
 import pytest
-from pydantic import FilePath, model_validator
+from pydantic import FilePath, create_model, model_validator
 
 from mbf_abstract.config.validation import validate
 from mbf_abstract.config.yaml_source import YamlDocument
@@ -42,6 +42,10 @@ class Model(ParameterModel):
 
 class Required(ParameterModel):
     width: float = parameter(..., "Width.", unit="m", gt=0)
+
+
+class Alternatives(ParameterModel):
+    part: Inner | int = 1
 
 
 DOCUMENT = YamlDocument(Path("/folder/c.yaml"), {}, {("block",): 4, ("block", "speed"): 5, ("block", "items", 1): 9})
@@ -120,10 +124,26 @@ def test_a_rule_between_fields_is_a_finding_of_the_block():
     assert findings[0].text.startswith("/folder/c.yaml:4: block: expected a count up to 100 at this speed")
 
 
-@pytest.mark.parametrize("data", [[1], 3, "text"])
+@pytest.mark.parametrize("data", [[1], 3, "text", [], 0, "", False])
 def test_a_block_that_is_no_mapping_is_refused(data):
     _, findings = check(data)
     assert "block: expected a block of keys, got" in findings[0].text
+
+
+def test_what_is_wrong_inside_one_alternative_goes_before_that_the_whole_is_no_other_one():
+    _, findings = check({"part": {"count": 0}}, Alternatives)
+    assert [finding.key for finding in findings] == ["block.part.count"]
+    _, findings = check({"part": "many"}, Alternatives)
+    assert [(finding.key, finding.expected) for finding in findings] == [
+        ("block.part", "a block of keys or a whole number")
+    ]
+
+
+@pytest.mark.parametrize(("count", "more"), [(15, ""), (16, ", ...")])
+def test_a_key_like_no_other_is_answered_by_the_first_15_known_ones(count, more):
+    model = create_model("Many", __base__=ParameterModel, **{f"name_{i:02}": (int, 0) for i in range(count)})
+    _, findings = check({"zzz": 1}, model)
+    assert findings[0].hint == "known keys: " + ", ".join(f"name_{i:02}" for i in range(15)) + more
 
 
 def test_relative_paths_count_from_the_folder_of_the_file(tmp_path):

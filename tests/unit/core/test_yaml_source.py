@@ -48,6 +48,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
         ("a: 2020-13-45\n", 1, "a: expected a plain value"),
         ("a: 1\nb: " + "9" * 5000 + "\n", 2, "b: expected a plain value, got '999"),
         ("a: 0x" + "f" * 5000 + "\n", 1, "a: expected a whole number of at most 63 bits, got '0xfff"),
+        (f"a: {2**63}\n", 1, "a: expected a whole number of at most 63 bits, got '9223372036854775808'"),
         ("a: *nowhere\n", 1, "expected YAML, got found undefined alias"),
         ("a: &a [*a]\n", 1, "aliases expanded"),
         ("x: &x 1\ny: [" + "*x, " * 101 + "]\n", 2, "expected at most 100 aliases, got more"),
@@ -66,6 +67,10 @@ def test_a_bad_file_is_refused_with_line_and_reason(tmp_path, text, line, expect
     assert expected in str(error.value)
     assert str(error.value).startswith(f"{tmp_path / 'c.yaml'}:{line}:")
     assert len(str(error.value)) < 400 + len(str(tmp_path))
+
+
+def test_the_largest_whole_number_has_63_bits(tmp_path):
+    assert load_yaml(write(tmp_path, f"a: [{2**63 - 1}, {1 - 2**63}]")).data == {"a": [2**63 - 1, 1 - 2**63]}
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):

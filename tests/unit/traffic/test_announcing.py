@@ -56,6 +56,24 @@ def test_of_a_path_of_two_poses_the_stretch_ahead_is_announced_whole_and_without
     assert (np.diff(announced.path[:, 0]) >= 0.0).all()
 
 
+def test_what_lies_before_a_path_remains_too(robot):
+    drive(robot, 1.0, 5.0)
+    assert robot.announced().remaining == pytest.approx(5.0 - robot.robot.pose.x, abs=0.02)
+
+
+def test_a_robot_without_a_goal_goes_nowhere_after_its_idle_time_and_not_before(robot):
+    handle = drive(robot, 0.0, 5.0)
+    assert robot.announced().remaining > 0.0
+    handle.cancel()
+    handle.wait()
+    ended = robot.clock.now()
+    robot.announced()
+    robot.clock.sleep(IDLE_TIME - 0.5)
+    assert robot.announced().remaining > 0.0
+    robot.clock.sleep_until(ended + IDLE_TIME)
+    assert robot.announced().remaining == 0.0
+
+
 def test_a_question_about_another_place_is_not_announced(robot):
     drive(robot, 0.0, 20.0)
     assert robot.navigator.send(GetPathGoal(Pose.planar(0.0, 30.0))).wait().success

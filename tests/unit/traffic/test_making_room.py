@@ -7,6 +7,7 @@ import pytest
 
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import ExePathGoal, FollowWaypointsGoal, MoveBaseGoal
 from mbf_abstract.outcomes import RecoveryOutcome
@@ -180,6 +181,20 @@ def test_it_goes_back_to_where_its_goal_was_however_often_it_makes_room(anna):
     assert pulled_out(session) == 3
 
 
+@pytest.mark.parametrize(("moved", "belongs"), [(0.1, 0.0), (0.3, 0.3)])
+def test_one_that_has_been_moved_since_its_goal_belongs_where_it_stands(anna, moved, belongs):
+    session = anna(dist_tolerance=0.05)
+    session.navigator.send(MoveBaseGoal(Pose.planar(0.5, 0.0))).wait()
+    session.robot.T_map_odom = Transform((0.0, moved, 0.0), parent="map", child="odom")
+    session.let_pass(IDLE_TIME + PERIOD)
+    ask(session)
+    session.let_pass(3.0)
+    session.way = None
+    session.let_pass(8.0)
+    targets = [event.data.get("target") for event in session.recorded(EventKind.GOAL_ACCEPTED)]
+    assert list(filter(None, targets))[-1][1] == pytest.approx(belongs, abs=0.01)
+
+
 def test_one_that_finds_no_place_says_so_and_is_not_waited_for(anna):
     session = anna(NoRoom)
     ask(session)
@@ -233,11 +248,12 @@ def test_a_drive_back_that_is_canceled_is_not_begun_again(anna):
     assert not session.server.move_base.busy
 
 
-def test_it_does_not_go_back_while_somebody_stands_there_and_stays_where_it_cannot(anna):
+@pytest.mark.parametrize("x", [0.2, 0.5])
+def test_it_does_not_go_back_while_somebody_stands_there_and_stays_where_it_cannot(anna, x):
     session = anna()
     ask(session)
     session.let_pass(3.0)
-    session.way, session.ben.asks = Announcement("", 0.0, np.array([(0.2, 0.0, 0.0)]), 0.0), False
+    session.way, session.ben.asks = Announcement("", 0.0, np.array([(x, 0.0, 0.0)]), 0.0), False
     session.let_pass(5.0)
     assert session.robot.pose.y == pytest.approx(1.0, abs=0.05)
     session.planner.play(*[RuntimeError("no way")] * 20)
