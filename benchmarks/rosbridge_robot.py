@@ -9,13 +9,13 @@ the time between two commands where the robot gets them, and from sending a goal
 
 import argparse
 import json
-import statistics
 import subprocess
 import sys
 import tempfile
 from itertools import pairwise
 from pathlib import Path
 
+from rosbridge import row
 from websockets.sync.client import connect
 
 from mbf_abstract.access.server_options import ServerOptions
@@ -81,12 +81,6 @@ def send_over(socket):
         socket.recv()
 
     return send
-
-
-def row(name: str, values: list[float]) -> str:
-    ordered = sorted(values)
-    high = ordered[int(0.99 * (len(ordered) - 1))]
-    return f"| {name} | {statistics.median(values):.2f} | {high:.2f} | {ordered[-1]:.2f} |"
 
 
 def between(times: list[float]) -> list[float]:

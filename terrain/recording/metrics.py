@@ -16,6 +16,7 @@ from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import arcsin, arctan2, norm
 from terrain.recording.clearance import clearances
+from terrain.recording.planning_times import PlanningTimes
 from terrain.recording.recording import Recording
 
 STANDING_SPEED = 0.02  # m/s; slower counts as standing
@@ -160,16 +161,10 @@ def mean_change(times: FloatArray, values: FloatArray) -> float:
 
 def planning_times(events: tuple[Event, ...]) -> list[float]:
     """How long [s] each call of a planner took that has ended, by the events' clock."""
-    began: dict[tuple[str, object], float] = {}
-    times = []
+    planning = PlanningTimes(lambda event: event.time)
     for event in events:
-        if event.data.get("method") == "make_plan":
-            call = (event.source, event.data.get("goal_id"))
-            if event.kind is EventKind.PLUGIN_CALL_STARTED:
-                began[call] = event.time
-            elif event.kind is EventKind.PLUGIN_CALL_ENDED and call in began:
-                times.append(event.time - began.pop(call))
-    return times
+        planning.write(event)
+    return planning.seconds
 
 
 def followed_length(plans: list[FloatArray]) -> float:

@@ -14,6 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 from trimesh.remesh import subdivide_to_size
 
 from mbf_abstract.geometry import FloatArray, Pose
+from terrain.recording.clearance import yaws_of
 from terrain.recording.recording import Recording
 from terrain.viewer.pictures.colours import ACTORS, BODY, DRIVEN, LIT_WALL, OBSTACLE, PLANNED, SCAN, Colour
 from terrain.viewer.pictures.raster import Camera, Canvas, paint_line, paint_surface
@@ -181,8 +182,7 @@ def _sky(size: tuple[int, int]) -> Canvas:
 
 def _smooth_headings(recording: Recording) -> FloatArray:
     """Headings (n,) [rad] of the robot, averaged over the last second or so."""
-    x, y, z, w = recording.poses[:, 3:].T
-    yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    yaw = np.unwrap(yaws_of(recording.poses[:, 3:]))
     for index in range(1, len(yaw)):
         yaw[index] = 0.9 * yaw[index - 1] + 0.1 * yaw[index]
     return np.asarray(yaw)
