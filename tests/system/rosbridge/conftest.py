@@ -14,7 +14,9 @@ import roslibpy
 import trimesh
 
 from mbf_abstract.access.server_options import ServerOptions
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.plugins import ControlResult
 from mbf_abstract.server.factory import read_config
 from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_abstract.testing.scripted_session import ScriptedSession
@@ -26,6 +28,11 @@ from mbf_ros.rosbridge_robot.options import RobotOptions
 from mbf_ros.rosbridge_robot.simulated_robot import serve_robot
 
 WITHIN = 20.0  # s; nothing waits that long unless it fails
+
+
+def creep(request):
+    """A controller's answer that never arrives."""
+    return ControlResult(ExePathOutcome.SUCCESS, "driving", Twist.planar(0.02))
 
 
 class Answers:

@@ -3,14 +3,15 @@
 import pytest
 import roslibpy
 
-from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
-from mbf_abstract.plugins import ControlResult, PlanResult
+from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_ros.messages.geometry import MessageContext, path_message
 from mbf_ros.messages.interfaces import fields_of
 from mbf_ros.rosbridge.navigation import ACTIONS
+from tests.system.rosbridge.conftest import creep
 
 SUCCEEDED, CANCELED, ABORTED = (roslibpy.core.GoalStatus(code) for code in (4, 5, 6))
 
@@ -45,11 +46,6 @@ def send(answers):
         return Goal(answers, ros, name, kind, goal)
 
     return make
-
-
-def creep(request):
-    """A controller's answer that never arrives."""
-    return ControlResult(ExePathOutcome.SUCCESS, "driving", Twist.planar(0.02))
 
 
 def test_move_base_drives_and_answers_with_feedback_and_a_result(serving, connect, send):

@@ -4,9 +4,7 @@ import pytest
 import roslibpy
 from roslibpy.ros1 import actionlib
 
-from mbf_abstract.geometry import Twist
-from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.plugins import ControlResult
+from tests.system.rosbridge.conftest import creep
 
 PREEMPTED, SUCCEEDED, ABORTED, REJECTED = 2, 3, 4, 5
 
@@ -42,10 +40,6 @@ def sent(answers):
         return goal, feedback, ended
 
     return send
-
-
-def creep(request):
-    return ControlResult(ExePathOutcome.SUCCESS, "driving", Twist.planar(0.02))
 
 
 def test_a_goal_arrives(serving, client, sent):

@@ -9,11 +9,10 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from mbf_abstract.access.page_access import PageAccess, Role
-from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import MoveBaseGoal
-from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.plugins import ControlResult
 from mbf_abstract.time.clock import unix_seconds
+from tests.system.rosbridge.conftest import creep
 
 TOPICS = {"op": "call_service", "id": "t", "service": "/rosapi/topics"}
 SECRETS = {"access": PageAccess("127.0.0.1", {"steering": Role.STEER, "watching": Role.WATCH})}
@@ -161,10 +160,6 @@ def test_who_has_no_token_takes_no_place_of_those_who_have_one(serving, raw, ask
     token = next(iter(access.roles))
     assert ask(raw(server.port, path=f"/{token}/"), TOPICS, "service_response")["result"] is True
     stranger.close()
-
-
-def creep(request):
-    return ControlResult(ExePathOutcome.SUCCESS, "driving", Twist.planar(0.02))
 
 
 def drive(socket, ask):

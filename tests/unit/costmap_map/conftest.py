@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 
@@ -23,6 +23,11 @@ TEN_BY_TEN = """
 .......###
 .......###
 """
+
+
+def lethal_cells(costmap: LayeredCostmap) -> set[tuple[int, int]]:
+    """Lethal cells (ix, iy) of a costmap as it is now."""
+    return {(int(ix), int(iy)) for iy, ix in np.argwhere(costmap.snapshot().cells == LETHAL)}
 
 
 def cells_of(picture: str) -> np.ndarray:

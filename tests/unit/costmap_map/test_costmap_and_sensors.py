@@ -9,12 +9,9 @@ import pytest
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_costmap_nav.grid.costmap import LETHAL
+from tests.unit.costmap_map.conftest import lethal_cells
 
 HERE = Pose.planar(5.0, 5.0)
-
-
-def lethal_cells(costmap):
-    return {(int(ix), int(iy)) for iy, ix in np.argwhere(costmap.snapshot().cells == LETHAL)}
 
 
 # ---------------------------------------------------------------------------------------------------- freshness

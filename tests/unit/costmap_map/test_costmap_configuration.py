@@ -14,14 +14,11 @@ from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_costmap_nav.files.map_description import MapError, MapMode
 from mbf_costmap_nav.files.map_io import OccupancyMap
 from mbf_costmap_nav.files.map_saver import save_map
-from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
+from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
+from tests.unit.costmap_map.conftest import lethal_cells
 
 HERE = Pose.planar(5.0, 5.0)
-
-
-def lethal_cells(costmap):
-    return {(int(ix), int(iy)) for iy, ix in np.argwhere(costmap.snapshot().cells == LETHAL)}
 
 
 ZONE = {"name": "stairs", "polygon": [[2.5, 2.5], [4.5, 2.5], [4.5, 3.5], [2.5, 3.5]], "speed_limit": 0.3}

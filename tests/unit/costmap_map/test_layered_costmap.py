@@ -8,12 +8,9 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import FREE, LETHAL, UNKNOWN, CellBox, Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
+from tests.unit.costmap_map.conftest import lethal_cells
 
 HERE = Pose.planar(5.0, 5.0)
-
-
-def lethal_cells(costmap):
-    return {(int(ix), int(iy)) for iy, ix in np.argwhere(costmap.snapshot().cells == LETHAL)}
 
 
 # --------------------------------------------------------------------------------------------- update windows

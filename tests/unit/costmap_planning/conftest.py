@@ -9,12 +9,18 @@ import pytest
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.plugins import PlanRequest
 from mbf_costmap_nav.grid.costmap import Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.plugins import CostmapContext
 
 SQUARE_ROBOT = Footprint([[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]])
+
+
+def plan(planner, start, goal, **request):
+    """Let a planner plan from (x, y, yaw) to (x, y, yaw)."""
+    return planner.make_plan(PlanRequest(Pose.planar(*start), Pose.planar(*goal), **request))
 
 
 class FixedCostmap(LayeredCostmap):

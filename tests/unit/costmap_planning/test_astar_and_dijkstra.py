@@ -9,13 +9,13 @@ import pytest
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.plugins import PlanRequest
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
 from mbf_costmap_nav.planners.straight_line import StraightLinePlanner
 from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
+from tests.unit.costmap_planning.conftest import plan
 
 POINT_ROBOT = Footprint([])
 PLANNERS = [AStarPlanner, DijkstraPlanner, ThetaStarPlanner]
@@ -41,10 +41,6 @@ WALLED = grid(
     ".....#...",
     ".....#...",
 )
-
-
-def plan(planner, start, goal, **request):
-    return planner.make_plan(PlanRequest(Pose.planar(*start), Pose.planar(*goal), **request))
 
 
 @pytest.mark.parametrize("planner_class", PLANNERS)

@@ -14,7 +14,7 @@ from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.map_queries import check_path
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.plugins import ControlRequest, PlanRequest
+from mbf_abstract.plugins import ControlRequest
 from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.controllers.dwa import DWAController
 from mbf_costmap_nav.controllers.mppi import MPPIController
@@ -31,14 +31,11 @@ from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
 from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
+from tests.unit.costmap_planning.conftest import plan
 
 PLANNERS = [AStarPlanner, DijkstraPlanner, ThetaStarPlanner]
 FREE_MAP = Costmap(np.zeros((200, 200), dtype=np.uint8), 0.05, -5.0, -5.0)
 SQUARE = Footprint([[2, 2], [2, -2], [-2, -2], [-2, 2]])
-
-
-def plan(planner, start, goal, **request):
-    return planner.make_plan(PlanRequest(Pose.planar(*start), Pose.planar(*goal), **request))
 
 
 # ------------------------------------------------------------------------------------------- grids and footprints

@@ -16,13 +16,10 @@ from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.kernels.car.curves import car_curve, sample_word
 from mbf_costmap_nav.kernels.search.nearest_cell import nearest_reached
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
+from tests.unit.costmap_planning.conftest import plan
 
 coordinates, angles = st.floats(-6, 6), st.floats(-math.pi, math.pi)
 CAR = Footprint([[0.4, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.4, -0.2]])
-
-
-def plan(planner, start, goal, **request):
-    return planner.make_plan(PlanRequest(Pose.planar(*start), Pose.planar(*goal), **request))
 
 
 @settings(max_examples=200, deadline=None)

@@ -21,6 +21,14 @@ def hills():
 
 
 @pytest.fixture(scope="session")
+def heights(tmp_path_factory):
+    """A file of 49 x 49 heights, four tiles of 12 m; read only."""
+    file = tmp_path_factory.mktemp("heights") / "heights.npy"
+    np.save(file, terrain(49, seed=3, walls=3).astype(np.float32))
+    return file
+
+
+@pytest.fixture(scope="session")
 def whole_hills(hills):
     return WholeMap(hills)
 

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from tiled_terrains import SPACING, terrain
+from tiled_terrains import SPACING
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
@@ -28,13 +28,6 @@ DENSE = "backend: mesh\nmesh_map:\n  layers: [{name: slopes, type: steepness}]\n
 
 def run(*arguments):
     return CliRunner().invoke(make_app(), ["map", "tile", *map(str, arguments)])
-
-
-@pytest.fixture(scope="module")
-def heights(tmp_path_factory):
-    file = tmp_path_factory.mktemp("heights") / "heights.npy"
-    np.save(file, terrain(49, seed=3, walls=3).astype(np.float32))
-    return file
 
 
 def test_heights_and_the_same_ground_as_a_mesh_become_tiles(heights, tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from distributed import LocalCluster
 from test_tile_building import bytes_of
-from tiled_terrains import SPACING, settings, terrain
+from tiled_terrains import SPACING, settings
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
@@ -18,14 +18,6 @@ from mbf_mesh_nav.tiles.building.sources import HeightSource
 from mbf_mesh_nav.tiles.tile import tile_file
 
 pytestmark = pytest.mark.timeout(300)
-
-
-@pytest.fixture(scope="module")
-def heights(tmp_path_factory):
-    """Heights of 49 x 49 samples: four tiles of 12 m."""
-    file = tmp_path_factory.mktemp("heights") / "heights.npy"
-    np.save(file, terrain(49, seed=3, walls=3).astype(np.float32))
-    return file
 
 
 @pytest.fixture(scope="module")
