@@ -49,6 +49,28 @@ def test_length_speed_climb_and_distance_of_a_straight_run():
     assert metrics.mean_cross_track_error_m == pytest.approx(0.5)
 
 
+def test_only_what_leads_up_is_climbed():
+    run = straight_run([])
+    poses = run.poses.copy()
+    poses[:, 2] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.3, 0.1, 0.2, 0.1, 0.0]
+
+    assert measure(replace(run, poses=poses)).climb_m == pytest.approx(0.6)
+
+
+def test_a_stop_that_was_asked_for_is_none_of_the_gates_own():
+    stops = [("velocity_gate", 1.0), ("exe_path", 2.0), ("velocity_gate", 3.0)]
+    events = tuple(Event(time, EventKind.ROBOT_STOPPED, source, {}) for source, time in stops)
+
+    assert measure(replace(straight_run([]), events=events)).gate_stops == 2
+
+
+def test_a_robot_that_starts_and_drives_on_does_not_stop():
+    moving, standing = [0.5, 0.0, 0.0], [0.0, 0.0, 0.0]
+
+    assert count_stops(np.array([standing, moving, moving])) == 0
+    assert count_stops(np.array([moving, standing, standing])) == 1
+
+
 def test_without_goal_and_plan_there_is_no_distance_and_no_error():
     run = replace(straight_run([]), paths=[])
 
