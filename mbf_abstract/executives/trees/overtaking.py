@@ -42,6 +42,8 @@ SIDEWAYS = (0.6, 0.9, 1.2, 1.8, 2.4)
 """So far [m] beside the path room to pass is looked for, to the left and to the right."""
 KEPT = 0.3
 """Beside somebody who moves a robot that keeps this distance [m] is hardly slowed down, see ``tracking/contact.py``."""
+BEGINNING = 0.5
+"""On so much [m] of a path past somebody the robot comes out from beside or behind them."""
 SPACING = 0.25
 """Length of the path [m] between two places that are looked at."""
 HELD_UP = 0.7
@@ -160,9 +162,10 @@ class Overtake(UpdatePath):
         self._taken = self.mission.plan is result
 
     def _meets_somebody(self, path: Path) -> bool:
-        """Whether somebody who moves is on a path, or the map cannot say."""
+        """Whether somebody who moves is on a path, once it has left where the robot is, or the map cannot say."""
+        begin = min(int(np.searchsorted(path.length - path.remaining_lengths, BEGINNING)), len(path) - 1)
         with suppress(TransformError):
-            met = self.mission.navigator.server.queries.what_blocks(path, margin=MARGIN)
+            met = self.mission.navigator.server.queries.what_blocks(path[begin:], margin=MARGIN)
             return any(blockage.by.motion is Motion.MOVING for blockage in met)
         return True
 
