@@ -12,13 +12,13 @@ from typing import Any
 
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.plugins import PluginKind
-from mbf_costmap_nav.control.path_handling import PathFollower
+from mbf_costmap_nav.control.regulated_speed import RegulatedFollower
 from mbf_costmap_nav.plugins import CostmapContext
 
 
-def car_on_path(context: CostmapContext, limits: Mapping[str, Any]) -> PathFollower:
+def car_on_path(context: CostmapContext, limits: Mapping[str, Any]) -> RegulatedFollower:
     """Regulated pure pursuit within another controller of this context; ``limits`` are parameters of it."""
     follower_class: Any = PluginRegistry("costmap").load(PluginKind.CONTROLLER, "regulated_pure_pursuit")
     parameters = follower_class.Parameters(**limits)
-    follower: PathFollower = follower_class(replace(context, name=f"{context.name}.car", parameters=parameters))
+    follower: RegulatedFollower = follower_class(replace(context, name=f"{context.name}.car", parameters=parameters))
     return follower

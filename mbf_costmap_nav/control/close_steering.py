@@ -80,7 +80,7 @@ def steer_closely(
         STEERING_COST * radius**2,
         reach,
         0.5 * resolution / (1.0 + abs(reach) / radius),  # half a cell of the outline from pose to pose
-        speed * parameters.control_period,
+        speed * parameters.period,
     )
     return None if beside > max(_beside(tracker, pose, reach), 2.0 * (ASTRAY * size) ** 2) else float(curvature)
 

@@ -72,7 +72,7 @@ class PursuitSteering(RegulatedFollower):
         regulated = min(self.regulated_speed(curvature, cost, cycle.tracker.to_cusp), cycle.speed_limit, self._fastest)
         regulated = min(regulated, self._stopping_speed(cycle))
         wanted = -regulated if backward else regulated
-        change = p.acc_lim_x * p.control_period
+        change = p.acc_lim_x * p.period
         speed = min(max(wanted, velocity.vx - change), velocity.vx + change)
         if abs(speed * curvature) > p.max_vel_theta:
             speed = math.copysign(p.max_vel_theta / abs(curvature), speed)
@@ -81,8 +81,8 @@ class PursuitSteering(RegulatedFollower):
     def _stopping_speed(self, cycle: ControlCycle) -> float:
         """Speed [m/s] from which the robot can brake for the end of its path, and for bends beyond the carrot."""
         p, speed = self.parameters, cycle.request.velocity.vx
-        stopping = stopping_speed(cycle.tracker.to_cusp, PLANNED * p.acc_lim_x, p.control_period)
+        stopping = stopping_speed(cycle.tracker.to_cusp, PLANNED * p.acc_lim_x, p.period)
         look_ahead, on_path = self.look_ahead_distance(speed), math.inf
-        if braking_distance(speed, p.acc_lim_x) > look_ahead:
-            on_path = speed_on_path(cycle.tracker, speed, look_ahead, p, p.max_vel_theta)
+        if p.control_period is not None or braking_distance(speed, p.acc_lim_x) > look_ahead:
+            on_path = speed_on_path(cycle.tracker, speed, look_ahead, self.known_inertia, p.max_vel_theta)
         return min(max(stopping, p.min_approach_vel), on_path)

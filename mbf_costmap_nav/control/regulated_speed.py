@@ -9,11 +9,14 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
+from mbf_abstract.maps.controllers.braking import BrakesOnItsArc
+from mbf_abstract.maps.controllers.inertia import InertiaParameters, stopping_speed
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_costmap_nav.control.path_handling import PathFollower
 from mbf_costmap_nav.grid.costmap import FREE, INSCRIBED
 from mbf_costmap_nav.grid.footprint import Footprint
 
+USUAL_PERIOD = 0.05  # s
 DEFAULT_DECAY, LEAST_DECAY = 10.0, 1e-3
 """1/m: of a map without an inflation layer, and of one whose costs do not fall at all."""
 
@@ -78,10 +81,21 @@ class RegulatedPurePursuitParameters(PluginParameters):
         ge=0.0,
         le=10.0,
     )
-    control_period: float = parameter(0.05, "Time between two calls, for accelerations.", unit="s", gt=0.0, le=1.0)
+    control_period: float | None = parameter(
+        None,
+        "Time between two calls; stated, no command changes by more until the next. Absent = 0.05 s, for speeds only.",
+        unit="s",
+        gt=0.0,
+        le=1.0,
+    )
+
+    @property
+    def period(self) -> float:
+        """Time between two calls [s], as stated or usual."""
+        return self.control_period or USUAL_PERIOD
 
 
-class RegulatedFollower(PathFollower):
+class RegulatedFollower(BrakesOnItsArc, PathFollower):
     """Base of a controller with regulated speeds."""
 
     Parameters: ClassVar[type[PluginParameters]] = RegulatedPurePursuitParameters
@@ -92,6 +106,17 @@ class RegulatedFollower(PathFollower):
     def parameters_changed(self) -> None:
         """Drop the outline with the old padding."""
         self._outline = None
+
+    @property
+    def known_inertia(self) -> InertiaParameters:
+        """What its speeds are planned with."""
+        p = self.parameters
+        return InertiaParameters(acc_lim_x=p.acc_lim_x, acc_lim_theta=p.acc_lim_theta, control_period=p.period)
+
+    @property
+    def inertia(self) -> InertiaParameters:
+        """The same for a robot whose control period is stated; others follow at once."""
+        return InertiaParameters() if self.parameters.control_period is None else self.known_inertia
 
     def checked_footprint(self) -> Footprint:
         """The costmap's outline, with the padding of the collision check where one is given."""
@@ -137,10 +162,11 @@ class RegulatedFollower(PathFollower):
     def rotation_speed(self, angle: float, speed: float) -> float:
         """Yaw rate [rad/s] that turns by ``angle`` [rad] and can still brake in time, from the present ``speed``."""
         p = self.parameters
-        change = p.acc_lim_theta * p.control_period
+        change = p.acc_lim_theta * p.period
         wanted = math.copysign(p.rotate_to_heading_vel, angle)
         reachable = min(max(wanted, speed - change), speed + change)
-        braking = math.sqrt(2.0 * p.acc_lim_theta * abs(angle))
+        reaction_time = 0.0 if p.control_period is None else p.control_period
+        braking = stopping_speed(abs(angle), p.acc_lim_theta, reaction_time)
         return min(max(reachable, -braking), braking)
 
     def regulated_speed(self, curvature: float, cost: int, remaining: float) -> float:

@@ -71,12 +71,16 @@ class RollingPursuit(PursuitSteering):
 
     def _rolls(self, cycle: ControlCycle, command: Twist) -> bool:
         """Whether the robot is faster than a command, and than creeping, by more than it can brake until the next."""
-        speed, change = cycle.request.velocity.vx, self.parameters.acc_lim_x * self.parameters.control_period
+        speed, change = cycle.request.velocity.vx, self.parameters.acc_lim_x * self.parameters.period
         return min(abs(speed) - CREEPING, abs(command.vx - speed)) > change + SLACK
 
     def _rolls_on(self, cycle: ControlCycle) -> float:
         """Length [m] that it rolls until it creeps."""
         return braking_distance(cycle.request.velocity.vx, self.parameters.acc_lim_x)
+
+    def _reachable(self, cycle: ControlCycle, command: Twist) -> Twist:
+        """What a robot whose control period is stated can do of a command until the next one; others do all of it."""
+        return self.inertia.reachable(command, cycle.request.velocity, self.parameters.max_vel_theta)
 
     def _can_turn_where_it_stops(self, cycle: ControlCycle, backward: bool) -> bool:
         """Whether a robot that brakes straight on has to turn to its path there, and nothing is in the way."""
@@ -89,7 +93,7 @@ class RollingPursuit(PursuitSteering):
 
     def _slowed(self, motion: Twist, velocity: Twist) -> Twist:
         """The same arc as slowly as the robot can drive it by now; a wider one where that is too fast to turn."""
-        change = self.parameters.acc_lim_x * self.parameters.control_period
+        change = self.parameters.acc_lim_x * self.parameters.period
         speed = min(max(motion.vx, velocity.vx - change), velocity.vx + change)
         most = self.parameters.max_vel_theta
         return Twist.planar(speed, wz=min(max(motion.wz / motion.vx * speed, -most), most))
@@ -109,5 +113,5 @@ class RollingPursuit(PursuitSteering):
 
     def _step(self, cycle: ControlCycle, outline_speed: float) -> float:
         """Time [s] from pose to pose that moves the outline by half a cell; among them are those of the next cycles."""
-        period = self.parameters.control_period
+        period = self.parameters.period
         return period / math.ceil(period * outline_speed / (0.5 * cycle.costmap.resolution) + 1e-9)

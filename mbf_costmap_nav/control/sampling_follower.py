@@ -12,16 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry import FloatArray, Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
-from mbf_abstract.maps.controllers.inertia import PLANNED, stopping_speed
-from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath, MotionLimits, cannot_turn_ahead
+from mbf_abstract.maps.controllers.inertia import PLANNED, InertiaParameters, stopping_speed
+from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath, MotionLimits
 from mbf_abstract.maps.controllers.room_to_turn import CREEPING
 from mbf_abstract.maps.controllers.standing import StandingParameters
+from mbf_abstract.maps.controllers.tight_places import cannot_turn_ahead
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters, MovingAround
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_costmap_nav.control.path_handling import ControlCycle, PathFollower
+from mbf_costmap_nav.control.trajectory_scoring import brakes_free, stops_free
 from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
 from mbf_costmap_nav.plugins import CostmapContext
 
@@ -46,6 +48,7 @@ class SamplingFollower(PathFollower):
 
     leaves_contacts = True
     parameters: Any  # those of a controller, with ``standing`` and ``moving_objects``
+    _brakes_by = InertiaParameters()
 
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)
@@ -68,6 +71,24 @@ class SamplingFollower(PathFollower):
     @abstractmethod
     def sampled(self, cycle: ControlCycle, around: MovingAround) -> ControlResult:
         """The best of the sampled motions."""
+
+    def keep_with(self, period: float, *, brakes: bool) -> None:
+        """Keep to the path with the limits of the parameters, and a ``period`` [s] between two calls.
+
+        A robot that ``brakes`` does so along its arc where no motion is free any more; others are stopped by zero.
+        """
+        p = self.parameters
+        inertia = InertiaParameters(acc_lim_x=p.acc_lim_x, acc_lim_theta=p.acc_lim_theta, control_period=period)
+        slowest = {"acc_lim_x": min(p.acc_lim_x, p.acc_lim_y)}
+        self._brakes_by = inertia.model_copy(update=slowest) if brakes else InertiaParameters()
+        reverses = p.min_vel_x < 0.0
+        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, inertia, self._brakes_by, allow_reversing=reverses)
+
+    def stops(self, cycle: ControlCycle, velocity: FloatArray, braking: FloatArray, dt: float) -> bool:
+        """Whether the robot touches nothing until it stands if no motion is free any more; see ``stops_free``."""
+        if self._brakes_by.acc_lim_x < math.inf:
+            return brakes_free(cycle, velocity, self._brakes_by)
+        return stops_free(cycle, velocity, braking, dt, self.parameters.check_ahead_time)
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path."""

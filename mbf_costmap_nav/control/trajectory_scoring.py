@@ -7,6 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.geometry import Twist
+from mbf_abstract.maps.controllers.inertia import InertiaParameters
 from mbf_costmap_nav.control.path_handling import ControlCycle
 from mbf_costmap_nav.critics import CRITICS, CriticParameters, Rollouts
 from mbf_costmap_nav.critics.obstacle_critic import COLLISION
@@ -157,6 +159,25 @@ def stops_free(
     steps = min(math.ceil(stands_after / dt) + 1, MOST_STEPS)
     speeds = np.maximum(np.abs(velocity)[:, None] - (braking * dt)[:, None] * np.arange(steps), 0.0)
     return is_free(cycle, np.sign(velocity)[:, None] * speeds, dt)
+
+
+def brakes_free(cycle: ControlCycle, velocity: FloatArray, inertia: InertiaParameters) -> bool:
+    """Whether a robot that brakes along the arc of a command, after a period of it, touches nothing until it stands.
+
+    So it is driven where none of its next motions is free. One that touches something already has to get out of it.
+
+    Parameters
+    ----------
+    velocity : (3,) float64
+        The command: vx, vy, wz [m/s, rad/s].
+    """
+    stands_after = inertia.stops_after(Twist.planar(*velocity.tolist()))
+    if cycle.touches or stands_after == 0.0:
+        return True
+    dt = inertia.control_period
+    steps = min(math.ceil(stands_after / dt) + 1, MOST_STEPS)
+    shares = np.clip(1.0 - dt / stands_after * (np.arange(steps) - 0.5), 0.0, 1.0)
+    return is_free(cycle, velocity[:, None] * shares, dt)
 
 
 def driven_poses(pose: tuple[float, float, float], velocities: FloatArray, dt: float) -> FloatArray:

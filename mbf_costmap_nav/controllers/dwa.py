@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.failures import no_motion
+from mbf_abstract.maps.controllers.inertia import reached
 from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
 from mbf_abstract.maps.tracking.avoidance import MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
@@ -25,7 +26,7 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlResult
 from mbf_costmap_nav.control.path_handling import ControlCycle
 from mbf_costmap_nav.control.sampling_follower import SamplingFollower, SamplingParameters
-from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score, stops_free
+from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score
 from mbf_costmap_nav.critics import CriticParameters
 from mbf_costmap_nav.critics.obstacle_critic import COLLISION
 from mbf_costmap_nav.kernels.control.rollout import clip_velocities
@@ -46,6 +47,13 @@ class DWAParameters(SamplingParameters):
     acc_lim_y: float = parameter(2.5, "Largest sideways acceleration.", unit="m/s^2", gt=0.0, le=100.0)
     acc_lim_theta: float = parameter(3.2, "Largest yaw acceleration.", unit="rad/s^2", gt=0.0, le=100.0)
     window_time: float = parameter(0.2, "Time in which a sampled velocity must be reachable.", unit="s", gt=0.0, le=5.0)
+    control_period: float | None = parameter(
+        None,
+        "Time between two calls; stated, no command changes by more until the next. Absent = window_time.",
+        unit="s",
+        gt=0.0,
+        le=1.0,
+    )
     sim_time: float = parameter(1.7, "How long a velocity is held in the simulation.", unit="s", gt=0.0, le=10.0)
     sim_step: float = parameter(0.05, "Step of the simulation.", unit="s", gt=0.0, le=0.5)
     vx_samples: int = parameter(15, "Samples of the forward speed.", ge=1, le=200)
@@ -70,13 +78,17 @@ class DWAController(SamplingFollower):
         """Take over new limits."""
         p = self.parameters
         self._braking = np.array([p.acc_lim_x, p.acc_lim_y, p.acc_lim_theta])
-        inertia = {"acc_lim_x": p.acc_lim_x, "acc_lim_theta": p.acc_lim_theta, "control_period": p.window_time}
-        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0, **inertia)
+        self.keep_with(self._period, brakes=p.control_period is not None)
+
+    @property
+    def _period(self) -> float:
+        """Time [s] in which a command must be reachable."""
+        return self.parameters.control_period or self.parameters.window_time
 
     def limits(self, cycle: ControlCycle) -> MotionLimits:
         """Those of the window."""
         p, top = self.parameters, cycle.speed_limit
-        gains = p.acc_lim_x * p.window_time, p.acc_lim_theta * p.window_time
+        gains = p.acc_lim_x * self._period, p.acc_lim_theta * self._period
         return MotionLimits(max(p.min_vel_x, -top), min(p.max_vel_x, top), p.max_vel_theta, False, *gains)
 
     @property
@@ -104,16 +116,21 @@ class DWAController(SamplingFollower):
         for sample in np.argsort(costs, kind="stable").tolist():
             if costs[sample] >= COLLISION:
                 break
-            command = Twist.planar(*candidates[sample].tolist())
+            command = self._reached(cycle, Twist.planar(*candidates[sample].tolist()))
             is_slowly = is_free(cycle, velocities[:, :checked_steps, sample], p.sim_step)
-            is_slowly = is_slowly and stops_free(
-                cycle, candidates[sample], self._braking, p.sim_step, p.check_ahead_time
-            )
+            velocity = np.array([command.vx, command.vy, command.wz])
+            is_slowly = is_slowly and self.stops(cycle, velocity, self._braking, p.sim_step)
             if is_slowly and self._held_is_free(cycle, command, checked_steps * p.sim_step):
                 return ControlResult(ExePathOutcome.SUCCESS, "", command, hindered_by)
         pose = cycle.request.pose
         text = f"all {len(candidates)} velocities reachable at ({pose.x:.2f}, {pose.y:.2f}) lead into an obstacle"
         return no_motion(self.costmap, pose, f"{text} within {p.sim_time:g} s")
+
+    def _reached(self, cycle: ControlCycle, candidate: Twist) -> Twist:
+        """A sampled velocity, or as much of the way to it as is driven until the next command."""
+        if self.parameters.control_period is None:
+            return candidate
+        return reached(candidate, cycle.request.velocity, tuple((self._period * self._braking).tolist()))
 
     def _held_is_free(self, cycle: ControlCycle, command: Twist, duration: float) -> bool:
         """Whether the footprint is free for ``duration`` [s] where a robot drives that takes up a velocity at once.

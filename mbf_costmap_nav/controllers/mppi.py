@@ -34,7 +34,7 @@ from mbf_costmap_nav.control.car_on_path import car_on_path
 from mbf_costmap_nav.control.path_handling import ControlCycle
 from mbf_costmap_nav.control.sampling_follower import SamplingFollower, SamplingParameters
 from mbf_costmap_nav.control.sampling_noise import correlated_noise, smoothing_matrix
-from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score, stops_free
+from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score
 from mbf_costmap_nav.critics import CriticParameters
 from mbf_costmap_nav.critics.obstacle_critic import COLLISION
 from mbf_costmap_nav.kernels.control.rollout import add_noise, blend, clip_velocities, integrate
@@ -116,8 +116,8 @@ class MPPIController(SamplingFollower):
         self._change = np.array([p.acc_lim_x, p.acc_lim_y, p.acc_lim_theta], dtype=np.float32) * np.float32(p.model_dt)
         deviation = [p.vx_std, p.vy_std if p.motion_model == "omni" else 0.0, p.wz_std]
         self._deviation, self._radius = np.array(deviation, dtype=np.float32), self.turning_radius
-        inertia = {"acc_lim_x": p.acc_lim_x, "acc_lim_theta": p.acc_lim_theta, "control_period": p.model_dt}
-        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0, **inertia)
+        # Who stands within half of what is looked ahead stops on it, as good as.
+        self.keep_with(p.model_dt, brakes=p.max_vel_x > 0.5 * p.acc_lim_x * p.check_ahead_time)
         if self._radius > 0.0:
             names = "max_vel_x", "max_vel_theta", "acc_lim_x", "max_path_distance"
             limits = {"min_turning_radius": self._radius, "allow_reversing": p.min_vel_x < 0.0}
@@ -217,7 +217,7 @@ class MPPIController(SamplingFollower):
         """Whether velocities (3, steps) are free, and the first of them can be stopped."""
         p = self.parameters
         first, braking = controls[:, 0].astype(np.float64), self._change.astype(np.float64) / p.model_dt
-        stops = stops_free(cycle, first, braking, p.model_dt, p.check_ahead_time)
+        stops = self.stops(cycle, first, braking, p.model_dt)
         return stops and is_free(cycle, controls, p.model_dt)
 
     def _meets(self, controls: Float32Array, cycle: ControlCycle, around: MovingAround) -> bool:

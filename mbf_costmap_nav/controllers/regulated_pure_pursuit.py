@@ -67,7 +67,7 @@ class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
         self._room_to_turn, self._tight_places = carried_over(self._room_to_turn, self._tight_places, old, self.tracker)
         return taken
 
-    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+    def free_motion(self, request: ControlRequest) -> ControlResult:
         """Find the carrot, choose between turning and driving, regulate the speed, look ahead for collisions."""
         cycle = self.begin_cycle(request)
         if isinstance(cycle, ControlResult):
@@ -75,17 +75,19 @@ class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
         if self.turning_radius > 0.0 and (missed := missed_goal(cycle.tracker, request.pose, cycle.goal_tolerance)):
             return missed
         if (drive_out := self._drive_out(cycle)) is not None:
-            return ControlResult(ExePathOutcome.SUCCESS, "", drive_out)
+            return ControlResult(ExePathOutcome.SUCCESS, "", self._reachable(cycle, drive_out))
         motions = self._motions(cycle)
         result = self._checked(cycle, motions)
         if not self._at_goal and self._tight_places.drives_otherwise(cycle.tracker, motions[0], result.command):
-            return self.compute_velocity_commands(request)
+            return self.free_motion(request)
         is_blocked = result.outcome == ExePathOutcome.BLOCKED_PATH
         if is_blocked and self.tracker and self._tight_places.begin_next_stroke(self.tracker):
-            return self.compute_velocity_commands(request)
-        if isinstance(command := result.command, Twist) and command.vx != 0.0 and self._rolls(cycle, command):
-            return replace(result, command=self._slowed(command, request.velocity))
-        return result
+            return self.free_motion(request)
+        if not isinstance(command := result.command, Twist):
+            return result
+        if command.vx != 0.0 and self._rolls(cycle, command):
+            command = self._slowed(command, request.velocity)
+        return replace(result, command=self._reachable(cycle, command))
 
     def _drive_out(self, cycle: ControlCycle) -> Twist | None:
         """The motion that leads straight out of what is touched; None for a car, at the goal and where none does."""
@@ -127,7 +129,7 @@ class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
         self._fastest = speed_before(to_tight, p.acc_lim_x)
         if to_tight > CLOSE_FROM:
             return []
-        motions = closely_along_path(cycle.tracker, cycle.request.pose, backward, rolls_on)
+        motions = closely_along_path(cycle.tracker, cycle.request.pose, backward, rolls_on, self.inertia.turn_rate)
         close = [no_tighter(motion, self.turning_radius) for motion in motions]
         if close:
             self.tracker.cusp_reached = CLOSELY
@@ -162,7 +164,8 @@ class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
         ahead = poses_ahead(cycle.tracker, self.look_ahead_distance(self.full_speed), backward)
         if cycle.first_collision(ahead) >= 0:
             return []
-        close = along_path(cycle.tracker, pose, backward, rolls_on=self._rolls_on(cycle))
+        rolls_on, turn_rate = self._rolls_on(cycle), self.inertia.turn_rate
+        close = along_path(cycle.tracker, pose, backward, rolls_on=rolls_on, turn_rate=turn_rate)
         motions = [motion for motion in close if abs(motion.wz) * self.turning_radius <= abs(motion.vx)]
         if not self.rotates:
             return motions
@@ -193,6 +196,7 @@ class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
         """Where a command leads into an obstacle in the check time, not beyond the next cusp; empty if free."""
         if command is self._known_free:
             return ""
+        command = self._reachable(cycle, command)
         rolls = self._rolls(cycle, command)
         if command.vx == 0.0 and not rolls and self.costmap.unpadded_footprint.is_circle:
             return ""  # whatever the polygon does that stands for it
@@ -203,7 +207,7 @@ class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
             shortest = max(shortest, LEADS_OUT)
         if command.vx != 0.0:  # a robot that may creep as far as the check time allows ends up at the obstacle
             duration = max(duration, shortest / max(abs(command.vx), SLOWEST))
-        duration /= cycle.limit_factor
+        duration = max(duration, self.inertia.time_on_arc(command)) / cycle.limit_factor
         poses, step = (self._rolled if rolls else self._driven)(cycle, command, duration)
         hit = cycle.first_collision(poses)
         if hit < 0:

@@ -24,7 +24,7 @@ from mbf_abstract.geometry.arithmetic import exp, norm
 from mbf_abstract.geometry.polyline import reverse_segments
 from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
 from mbf_abstract.maps.controllers.failures import missed_path, no_motion
-from mbf_abstract.maps.controllers.inertia import PLANNED, InertiaParameters, stopping_speed
+from mbf_abstract.maps.controllers.inertia import PLANNED, stopping_speed
 from mbf_abstract.maps.tracking.avoidance import Encounters, MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
@@ -67,8 +67,7 @@ class MPPIController(SamplingFollower):
     def parameters_changed(self) -> None:
         """Take over new limits."""
         p = self.parameters
-        inertia = {name: getattr(p, name) for name in InertiaParameters.model_fields}
-        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, allow_reversing=p.min_vel_x < 0.0, **inertia)
+        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, p, p, allow_reversing=p.min_vel_x < 0.0)
 
     @classmethod
     def reach(cls, parameters: MPPIParameters) -> float:

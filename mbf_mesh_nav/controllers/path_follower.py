@@ -18,6 +18,7 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to, in_robot_frame, poses_on_arc
 from mbf_abstract.geometry.arithmetic import norm, rotated
 from mbf_abstract.geometry.tangent_plane import heading_error
+from mbf_abstract.maps.controllers.braking import BrakesOnItsArc
 from mbf_abstract.maps.controllers.driving_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_path
 from mbf_abstract.maps.controllers.inertia import PLANNED, InertiaParameters, speed_on_path, stopping_speed
@@ -74,7 +75,7 @@ class PathFollowerParameters(InertiaParameters):
     )
 
 
-class PathFollower(LeavesContacts, SurfaceFollower):
+class PathFollower(LeavesContacts, BrakesOnItsArc, SurfaceFollower):
     """Pure pursuit on the surface."""
 
     Parameters = PathFollowerParameters
@@ -86,6 +87,11 @@ class PathFollower(LeavesContacts, SurfaceFollower):
         """To the end of the path that is checked, from a robot beside it."""
         ahead = parameters.check_ahead_dist
         return max(ahead + parameters.max_path_distance if ahead else 0.0, parameters.max_surface_distance)
+
+    @property
+    def inertia(self) -> InertiaParameters:
+        """As its parameters have it."""
+        return self.parameters
 
     @property
     def turns_on_the_spot(self) -> bool:
@@ -100,7 +106,7 @@ class PathFollower(LeavesContacts, SurfaceFollower):
         self._approach = GoalApproach(path[-1], self.parameters.goal_distance)
         return True
 
-    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+    def free_motion(self, request: ControlRequest) -> ControlResult:
         """One cycle: locate, project onto the path, pursue the point ahead."""
         pose, self._measured = request.pose, request.velocity
         cycle = self.begin_cycle(pose, self.parameters.max_surface_distance)

@@ -18,6 +18,7 @@ import numpy as np
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm, rotated_back
 from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
+from mbf_abstract.maps.controllers.braking import BrakesOnItsArc
 from mbf_abstract.maps.controllers.failures import blocked_path
 from mbf_abstract.maps.controllers.inertia import PLANNED, InertiaParameters, speed_before_bends, stopping_speed
 from mbf_abstract.outcomes import ExePathOutcome
@@ -65,7 +66,7 @@ class VectorFieldParameters(InertiaParameters):
     )
 
 
-class VectorFieldController(SurfaceFollower):
+class VectorFieldController(BrakesOnItsArc, SurfaceFollower):
     """Follows the field of the plan it executes."""
 
     Parameters = VectorFieldParameters
@@ -73,6 +74,11 @@ class VectorFieldController(SurfaceFollower):
 
     _face = -1
     _measured = Twist()
+
+    @property
+    def inertia(self) -> InertiaParameters:
+        """As its parameters have it."""
+        return self.parameters
 
     @property
     def turns_on_the_spot(self) -> bool:
@@ -94,7 +100,7 @@ class VectorFieldController(SurfaceFollower):
         self._leg, self._face = 0, -1
         return True
 
-    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+    def free_motion(self, request: ControlRequest) -> ControlResult:
         """One cycle: locate, look up the direction, apply the law."""
         pose, self._measured = request.pose, request.velocity
         cycle = self.begin_cycle(pose, self.parameters.max_surface_distance, self._face)

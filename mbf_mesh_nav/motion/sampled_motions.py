@@ -141,13 +141,18 @@ class SampledMotions:
         return np.asarray(controls)
 
     def braked(self, control: FloatArray) -> FloatArray | None:
-        """Controls (time_steps, 2) of a robot that is stopped after a step with ``control`` (2,); None = at once."""
-        p = self.parameters
+        """Controls (time_steps, 2) that brake on the arc of ``control`` (2,) after a period of it; None = at once.
+
+        A car keeps its wheels as they are.
+        """
+        p, (speed, turn) = self.parameters, control.tolist()
         if p.acc_lim_x == math.inf:
             return None
-        changes = p.model_dt * np.array([p.acc_lim_x, p.acc_lim_theta])
-        speeds = np.maximum(np.abs(control) - changes * np.arange(p.time_steps)[:, None], 0.0)
-        return np.asarray(np.sign(control) * speeds)
+        is_car = p.motion_model == "ackermann"
+        stops_after = max(p.stops_after(Twist.planar(speed, wz=0.0 if is_car else turn)), 1e-9)
+        ends = p.control_period + stops_after - p.model_dt * (np.arange(p.time_steps) + 0.5)
+        shares = np.clip(ends / stops_after, 0.0, 1.0)
+        return np.column_stack([speed * shares, np.full_like(shares, turn) if is_car else turn * shares])
 
     def _limit_changes(self, controls: FloatArray, measured: Twist) -> None:
         """Let controls (n, time_steps, 2) change from step to step as the robot can; steering angles at once."""
@@ -155,10 +160,10 @@ class SampledMotions:
         turning = p.acc_lim_theta if p.motion_model == "differential" else math.inf
         for component, acceleration, now in ((0, p.acc_lim_x, measured.vx), (1, turning, measured.wz)):
             if acceleration < math.inf:
-                last, change = np.full(len(controls), now), acceleration * p.model_dt
-                for step in controls[..., component].T:
+                last, change = np.full(len(controls), now), acceleration * min(p.model_dt, p.control_period)
+                for step in controls[..., component].T:  # the first is what is commanded until the next cycle
                     np.clip(step, last - change, last + change, out=step)
-                    last = step
+                    last, change = step, acceleration * p.model_dt
 
     def driven(self, controls: FloatArray) -> FloatArray:
         """Speeds and yaw rates (..., 2) that controls (..., 2) lead to."""

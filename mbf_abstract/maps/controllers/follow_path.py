@@ -13,12 +13,19 @@ from typing import ClassVar
 from mbf_abstract.execution.path_tracker import CUSP_REACHED, PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.maps.controllers.braking import BrakesOnItsArc
 from mbf_abstract.maps.controllers.continued_path import carried_over
 from mbf_abstract.maps.controllers.driving_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.maps.controllers.end_of_path import at_exact_end
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_path, no_path, outside_map, storeys_off
 from mbf_abstract.maps.controllers.follow_path_parameters import FollowPathParameters
-from mbf_abstract.maps.controllers.inertia import PLANNED, braking_distance, speed_on_path, stopping_speed
+from mbf_abstract.maps.controllers.inertia import (
+    PLANNED,
+    InertiaParameters,
+    braking_distance,
+    speed_on_path,
+    stopping_speed,
+)
 from mbf_abstract.maps.controllers.room_to_turn import (
     SMALL_TURN,
     RoomToTurn,
@@ -45,12 +52,12 @@ from mbf_abstract.maps.controllers.turn_at_goal import TurnAtGoal
 from mbf_abstract.maps.queries import AS_CONFIGURED, PADDED, CellState
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters
-from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
+from mbf_abstract.plugins import ControlRequest, ControlResult
 
 MIN_SPEED = 0.05  # m/s; below it a robot would not reach the end of its path
 
 
-class FollowPath(LeavesContacts, SteeringToPath, AbstractController):
+class FollowPath(LeavesContacts, SteeringToPath, BrakesOnItsArc):
     """Steers along the arc to a point ahead on the path."""
 
     Parameters: ClassVar[type[PluginParameters]] = FollowPathParameters
@@ -67,6 +74,11 @@ class FollowPath(LeavesContacts, SteeringToPath, AbstractController):
     def turns_on_the_spot(self) -> bool:
         """True."""
         return True
+
+    @property
+    def inertia(self) -> InertiaParameters:
+        """As its parameters have it."""
+        return self.parameters
 
     @property
     def remaining(self) -> float:
@@ -91,7 +103,7 @@ class FollowPath(LeavesContacts, SteeringToPath, AbstractController):
         self._tracker, self._turn_at_goal, self.ended_early = new, TurnAtGoal(AT_END), False
         return new is not None
 
-    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+    def free_motion(self, request: ControlRequest) -> ControlResult:
         """Find the point ahead, steer to it, and check the motion for obstacles."""
         p, pose, tracker = self.parameters, request.pose, self._tracker
         if tracker is None:
@@ -124,9 +136,9 @@ class FollowPath(LeavesContacts, SteeringToPath, AbstractController):
         except TransformError as error:
             return ControlResult(ExePathOutcome.TF_ERROR, str(error))
         if not self._turn_at_goal.is_turning and self._tight_places.drives_otherwise(tracker, motions[0], command):
-            return self.compute_velocity_commands(request)
+            return self.free_motion(request)
         if obstacle and (self._tight_places.begin_next_stroke(tracker) or self._ends_here(pose, tracker)):
-            return self.compute_velocity_commands(request)
+            return self.free_motion(request)
         if obstacle:
             return blocked_path(self.navigation_map, there, obstacle)
         return ControlResult(ExePathOutcome.SUCCESS, "", command)
@@ -165,7 +177,7 @@ class FollowPath(LeavesContacts, SteeringToPath, AbstractController):
         error = off_course(bearing, backward)
         tracker.cusp_reached = CUSP_REACHED
         to_tight = self.to_tight_place(pose, self._measured.vx)
-        if to_tight <= CLOSE_FROM and (close := closely_along_path(tracker, pose, backward, rolls_on)):
+        if to_tight <= CLOSE_FROM and (close := closely_along_path(tracker, pose, backward, rolls_on, p.turn_rate)):
             tracker.cusp_reached = CLOSELY
             return close
         if self._tight_places.is_close(tracker):
@@ -195,7 +207,7 @@ class FollowPath(LeavesContacts, SteeringToPath, AbstractController):
         if not all(fits(*one) for one in poses_ahead(tracker, reach, backward).tolist()):
             return []
         error = angle_to_path(tracker, pose, backward)
-        motions = along_path(tracker, pose, backward, rolls_on=self._rolls_on)
+        motions = along_path(tracker, pose, backward, rolls_on=self._rolls_on, turn_rate=self.parameters.turn_rate)
         motions += [self._turn(error)] if abs(error) > SMALL_TURN else []
         return [self._reachable(motion) for motion in motions]
 

@@ -8,7 +8,6 @@ wheels nearly do.
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 import numpy as np
 
@@ -22,24 +21,10 @@ SPACING, ARM = 0.1, 2
 """Distance [m] of the points of a path ahead; a bend is what it turns by over so many of them."""
 PLANNED = 0.7
 """Share of its braking that is planned with: a robot that cuts its path comes to the end sooner than by its length."""
+ROUNDING = 1e-9
+"""With less than this share of its speed a robot stands."""
 LOOKS = 4.0
 """So often a robot is asked at least while it drives as far as it looks ahead."""
-
-
-class Inertia(Protocol):
-    """What parameters state of a robot's inertia: those of this module, or of a controller that had them before."""
-
-    @property
-    def acc_lim_x(self) -> float:
-        """Largest change of speed [m/s^2]."""
-
-    @property
-    def acc_lim_theta(self) -> float:
-        """Largest change of the yaw rate [rad/s^2]."""
-
-    @property
-    def control_period(self) -> float:
-        """Time between two calls [s]."""
 
 
 class InertiaParameters(PluginParameters):
@@ -58,6 +43,13 @@ class InertiaParameters(PluginParameters):
         """Time [s] in which a robot goes on as before; 0 for one that follows at once."""
         return self.control_period if self.acc_lim_x < math.inf else 0.0
 
+    def time_on_arc(self, motion: Twist) -> float:
+        """Time [s] for which an arc must be free, as it is driven on until the robot has braked along it.
+
+        Half a period is for what it was faster before.
+        """
+        return 1.5 * self.reaction_time + 0.5 * self.stops_after(motion)
+
     def reachable(self, command: Twist, measured: Twist, turning: float = math.inf) -> Twist:
         """What the robot can do of a command until the next one: an arc is kept, it brakes before a turn.
 
@@ -71,6 +63,31 @@ class InertiaParameters(PluginParameters):
         if command.vx == 0.0 != command.wz and abs(speed) > CREEPING:
             turn = 0.0
         return Twist.planar(speed, command.vy, within(within(turn, measured.wz, turn_gain), 0.0, turning))
+
+    def reached(self, command: Twist, measured: Twist) -> Twist:
+        """What a robot makes of a command until the next one, its speed and its turn each by itself."""
+        if self.acc_lim_x == self.acc_lim_theta == math.inf:
+            return command
+        gain, turn_gain = self.acc_lim_x * self.control_period, self.acc_lim_theta * self.control_period
+        return reached(command, measured, (gain, gain, turn_gain))
+
+    def stops_after(self, motion: Twist) -> float:
+        """Time [s] in which a motion is braked along its arc: what takes longer, the speed or the turn, decides."""
+        return max(math.hypot(motion.vx, motion.vy) / self.acc_lim_x, abs(motion.wz) / self.acc_lim_theta)
+
+    def braked(self, arc: Twist, measured: Twist) -> Twist:
+        """The arc of a command as slowly as a robot can drive it that is ``measured`` to move so; zero if it stops.
+
+        A turn on the spot is no arc; it is stopped by zero.
+        """
+        squares = arc.vx * arc.vx + arc.vy * arc.vy
+        if self.acc_lim_x == math.inf or squares == 0.0:
+            return Twist()
+        rolls = max(min((measured.vx * arc.vx + measured.vy * arc.vy) / squares, 1.0), 0.0)
+        share = rolls - self.control_period / self.stops_after(arc)
+        if share < ROUNDING:
+            return Twist()
+        return Twist.planar(share * arc.vx, share * arc.vy, share * arc.wz)
 
     def turn_rate(self, rate: float, angle: float) -> float:
         """A yaw rate [rad/s] from which the robot can stop when it has turned by ``angle`` [rad], by half its braking.
@@ -86,6 +103,14 @@ class InertiaParameters(PluginParameters):
 def within(wanted: float, now: float, change: float) -> float:
     """The value nearest to a wanted one that differs from that of now by ``change`` at most."""
     return max(now - change, min(wanted, now + change))
+
+
+def reached(command: Twist, measured: Twist, changes: tuple[float, float, float]) -> Twist:
+    """What comes of a command where vx, vy [m/s] and the yaw rate [rad/s] change by so much, vx and vy together."""
+    ahead, left = command.vx - measured.vx, command.vy - measured.vy
+    share = 1.0 / max(math.hypot(ahead / changes[0], left / changes[1]), 1.0)
+    vx, vy = measured.vx + share * ahead, measured.vy + share * left
+    return Twist.planar(vx, vy, within(command.wz, measured.wz, changes[2]))
 
 
 def stopping_speed(distance: float, deceleration: float, reaction_time: float = 0.0) -> float:
@@ -104,7 +129,7 @@ def braking_distance(speed: float, deceleration: float) -> float:
     return max(speed**2 - CREEPING**2, 0.0) / (2.0 * deceleration)
 
 
-def speed_on_path(tracker: PathTracker, speed: float, look_ahead: float, p: Inertia, turning: float) -> float:
+def speed_on_path(tracker: PathTracker, speed: float, look_ahead: float, p: InertiaParameters, turning: float) -> float:
     """The speed [m/s] at which a robot comes along its path; inf where it does not need to be slower.
 
     Parameters
@@ -125,7 +150,7 @@ def speed_on_path(tracker: PathTracker, speed: float, look_ahead: float, p: Iner
     return min(bends, look_ahead / (LOOKS * p.control_period))
 
 
-def speed_before_bends(points: FloatArray, look_ahead: float, p: Inertia, turning: float) -> float:
+def speed_before_bends(points: FloatArray, look_ahead: float, p: InertiaParameters, turning: float) -> float:
     """The speed [m/s] from which a robot has braked for every bend of a path ahead.
 
     Parameters

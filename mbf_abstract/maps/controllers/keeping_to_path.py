@@ -21,19 +21,19 @@ from typing import Any
 
 import numpy as np
 
-from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.geometry import FloatArray, Path, Pose, Twist
+from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.controllers.braking import BrakesOnItsArc, LastFreeArc
 from mbf_abstract.maps.controllers.failures import stands
 from mbf_abstract.maps.controllers.follow_path import FollowPath
 from mbf_abstract.maps.controllers.follow_path_parameters import FollowPathParameters
+from mbf_abstract.maps.controllers.inertia import InertiaParameters
 from mbf_abstract.maps.controllers.room_to_turn import CREEPING
 from mbf_abstract.maps.controllers.standing import Standing, StandingParameters
-from mbf_abstract.maps.controllers.tight_places import HEADINGS
 from mbf_abstract.maps.map_plugin import MapContext
 from mbf_abstract.maps.tracking.avoidance import MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
+from mbf_abstract.plugins import ControlRequest, ControlResult
 
 AWAY, AHEAD, FAR = 0.5, 0.25, 2.0
 """The robot samples again ``AWAY`` [m] from where it stood if it has come ``AHEAD`` on its path, else ``FAR``."""
@@ -92,11 +92,12 @@ class KeepingToPath:
     def __init__(self, context: MapContext[Any]) -> None:
         self._follower = FollowPath(replace(context, name=f"{context.name}.path", parameters=FollowPathParameters()))
         self._standing = Standing()
+        self._last_arc, self._brakes_by = LastFreeArc(), InertiaParameters()
         self._stood_at: Pose | None = None
         self._remained = math.inf
         self.is_keeping = False
         """Whether the last command was one along the path."""
-        self.car: AbstractController | None = None
+        self.car: BrakesOnItsArc | None = None
         """What keeps a car to its path; None = nothing does."""
 
     @property
@@ -104,15 +105,27 @@ class KeepingToPath:
         """Whether the robot is leaving a contact."""
         return self._follower.is_leaving
 
-    def drive_with(self, max_vel_x: float, max_vel_theta: float, *, allow_reversing: bool, **inertia: float) -> None:
-        """Take over the limits [m/s, rad/s] of the controller, and ``InertiaParameters`` of the robot."""
+    def drive_with(
+        self,
+        max_vel_x: float,
+        max_vel_theta: float,
+        inertia: InertiaParameters,
+        brakes_by: InertiaParameters,
+        *,
+        allow_reversing: bool,
+    ) -> None:
+        """Take over the limits [m/s, rad/s] of the controller, and the robot's inertia.
+
+        ``brakes_by`` is how it brakes along its arc where no motion is free any more.
+        """
         self._follower.parameters = FollowPathParameters(
             max_vel_x=max_vel_x,
             max_vel_theta=max_vel_theta,
             allow_reversing=allow_reversing,
             max_path_distance=FARTHEST,
-            **inertia,
+            **{name: getattr(inertia, name) for name in InertiaParameters.model_fields},
         )
+        self._brakes_by = brakes_by
 
     def set_plan(self, path: Path) -> None:
         """Take over a path. Where the robot stood is remembered, however often it is planned anew."""
@@ -168,7 +181,7 @@ class KeepingToPath:
         stood = self._standing.time(now, limits.fastest, limits.turning)
         if (out := self.out_of_contact(request, limits)) is not None:
             self._standing.commanded(out.command)
-            return out
+            return self._or_brake(out, request.velocity)
         along, reason = None, ""
         drives = not limits.is_car or (self.car is not None and self._follower.remaining > AT_END)
         keeps = drives and (
@@ -190,6 +203,15 @@ class KeepingToPath:
         if result.hindered_by or not result.success:
             self._standing.restart(now)
         self._standing.commanded(result.command)
+        return self._or_brake(result, request.velocity)
+
+    def _or_brake(self, result: ControlResult, measured: Twist) -> ControlResult:
+        """An answer as far as the robot can do it until the next, or braking along its arc instead of a refusal."""
+        if not result.success:
+            return self._last_arc.answer(result, measured, self._brakes_by)
+        if isinstance(result.command, Twist):
+            result = replace(result, command=self._brakes_by.reached(result.command, measured))
+        self._last_arc.keep(result.command)
         return result
 
     def _has_stood(self, pose: Pose, stands_now: bool) -> bool:
@@ -215,7 +237,7 @@ class KeepingToPath:
     ) -> tuple[ControlResult | None, str]:
         """The answer that keeps to the path; None, and why, where it is blocked or somebody comes."""
         follower = self.car if limits.is_car and self.car is not None else self._follower
-        answer = follower.compute_velocity_commands(request)
+        answer = follower.free_motion(request)
         if not isinstance(answer.command, Twist) or not answer.success:
             return None, answer.message
         command = limits.hold(answer.command, request.velocity)
@@ -226,20 +248,3 @@ class KeepingToPath:
             if around.meet(np.ascontiguousarray(driven.T[:, :, None], dtype=np.float32), LOOK_STEP).touches[0]:
                 return None, "somebody comes"
         return replace(answer, command=command), ""
-
-
-def cannot_turn_ahead(tracker: PathTracker, reach: float, fits: Callable[[FloatArray], bool]) -> bool:
-    """Whether the robot stops or reverses within ``reach`` [m] where it cannot turn.
-
-    Parameters
-    ----------
-    fits : callable
-        Whether the outline touches nothing at poses (n, 3: x, y [m], yaw [rad]).
-    """
-    near = (tracker.cusps >= tracker.progress) & (tracker.cusps <= tracker.progress + reach)
-    if not near.any():
-        return False
-    for x, y in tracker.points_at(tracker.cusps[near])[:, :2].tolist():
-        if not fits(np.column_stack([np.full(len(HEADINGS), x), np.full(len(HEADINGS), y), HEADINGS])):
-            return True
-    return False

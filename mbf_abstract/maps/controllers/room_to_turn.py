@@ -47,6 +47,15 @@ CURVES = (2.0, 1.0, 0.5, 0.0)
 """Curvatures [1/m] tried instead of a turn on the spot, in this order."""
 
 
+TurnRate = Callable[[float, float], float]
+"""The yaw rate [rad/s] at which a robot begins a turn by an angle [rad], of the one that is wanted."""
+
+
+def at_once(rate: float, angle: float) -> float:
+    """That of a robot that stops turning at once: the wanted one."""
+    return rate
+
+
 class RoomToTurn:
     """The choice of a controller, and how far it has driven to make room."""
 
@@ -133,6 +142,7 @@ def along_path(
     distances: Sequence[float] = NEAR,
     *,
     rolls_on: float = 0.0,
+    turn_rate: TurnRate = at_once,
 ) -> list[Twist]:
     """Creeping along arcs to points close ahead on a path seen from above, forward or backward as it is to be driven.
 
@@ -143,14 +153,19 @@ def along_path(
     ----------
     rolls_on : float
         Length [m] that the robot rolls before it creeps; the points lie so much farther ahead.
+    turn_rate : callable
+        The yaw rate [rad/s] from which it can stop when it has turned so far [rad], if that is less than a wanted one;
+        it creeps more slowly along an arc that turns faster.
     """
     motions = []
     for distance in distances:
         x, y = tracker.straight_on(distance + rolls_on).tolist()
         bearing, curvature = arc_to(pose, np.array([x, y, pose.z]))
-        if abs(off_course(bearing, backward)) <= LOOKS_ALONG:
+        off = off_course(bearing, backward)
+        if abs(off) <= LOOKS_ALONG:
             speed = -CREEPING if backward else CREEPING
-            motions.append(Twist.planar(speed, wz=speed * curvature))
+            turn = turn_rate(speed * curvature, 2.0 * off)
+            motions.append(Twist.planar(speed if turn == speed * curvature else turn / curvature, wz=turn))
     return motions
 
 
@@ -160,9 +175,11 @@ def angle_to_path(tracker: PathTracker, pose: Pose, backward: bool = False, roll
     return off_course(arc_to(pose, np.array([x, y, pose.z]))[0], backward)
 
 
-def closely_along_path(tracker: PathTracker, pose: Pose, backward: bool = False, rolls_on: float = 0.0) -> list[Twist]:
+def closely_along_path(
+    tracker: PathTracker, pose: Pose, backward: bool = False, rolls_on: float = 0.0, turn_rate: TurnRate = at_once
+) -> list[Twist]:
     """The same to points of ``CLOSE``, then wider curves than to the first of them."""
-    motions = along_path(tracker, pose, backward, CLOSE, rolls_on=rolls_on)
+    motions = along_path(tracker, pose, backward, CLOSE, rolls_on=rolls_on, turn_rate=turn_rate)
     return [*motions, *wider_curves(motions[0])[1:]] if motions else []
 
 

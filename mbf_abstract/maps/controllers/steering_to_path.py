@@ -38,13 +38,13 @@ class SteeringToPath(MapPlugin):
         Of a turn to the goal's heading the whole sweep must be: where it is blocked later, no way is left to drive on.
         """
         left, speed = min(tracker.to_cusp, self._arc_to_goal(pose, tracker)), abs(motion.vx)
+        shortest = max(self.parameters.time_on_arc(Twist.planar(wz=motion.wz)), SHORTEST_CHECK)
         if motion.vx == 0.0 != motion.wz and self._turn_at_goal.is_turning:
-            return max(turn_left(self._from_goal(pose, tracker)[1], motion) / abs(motion.wz), SHORTEST_CHECK)
+            return max(turn_left(self._from_goal(pose, tracker)[1], motion) / abs(motion.wz), shortest)
         if motion.vx == 0.0:
             left, speed = abs(self._angle_left(pose, tracker)), abs(motion.wz)
-        longest = max(self.parameters.check_ahead_time, 0.5 * speed / self.parameters.acc_lim_x)
-        stops_turning = 0.5 * abs(motion.wz) / self.parameters.acc_lim_theta
-        return max(min(longest, left / speed), stops_turning, SHORTEST_CHECK) if speed > 0.0 else longest
+        longest = max(self.parameters.check_ahead_time, self.parameters.time_on_arc(motion))
+        return max(min(longest, left / speed), shortest) if speed > 0.0 else longest
 
     def _arc_to_goal(self, pose: Pose, tracker: PathTracker) -> float:
         """Length [m] of the arc to the goal where that is the point ahead; it cuts what the path still goes around."""

@@ -173,6 +173,23 @@ def has_room(x: float, y: float, yaw: float, fits: Fits) -> bool:
     return (left and right) or (left and fits_beside(2.0)) or (right and fits_beside(-2.0))
 
 
+def cannot_turn_ahead(tracker: PathTracker, reach: float, fits: Callable[[FloatArray], bool]) -> bool:
+    """Whether the robot stops or reverses within ``reach`` [m] where it cannot turn.
+
+    Parameters
+    ----------
+    fits : callable
+        Whether the outline touches nothing at poses (n, 3: x, y [m], yaw [rad]).
+    """
+    near = (tracker.cusps >= tracker.progress) & (tracker.cusps <= tracker.progress + reach)
+    if not near.any():
+        return False
+    for x, y in tracker.points_at(tracker.cusps[near])[:, :2].tolist():
+        if not fits(np.column_stack([np.full(len(HEADINGS), x), np.full(len(HEADINGS), y), HEADINGS])):
+            return True
+    return False
+
+
 def outline_fits(plugin: MapPlugin, near: Pose, query: PlaceQuery) -> Fits:
     """The question to a plugin's map, for poses at the height and in the frame of the pose ``near``."""
     check = plugin.navigation_map.path_check(query)

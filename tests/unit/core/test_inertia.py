@@ -7,15 +7,19 @@ import numpy as np
 import pytest
 
 from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
+from mbf_abstract.maps.controllers.braking import LastFreeArc
 from mbf_abstract.maps.controllers.inertia import (
     InertiaParameters,
     braking_distance,
+    reached,
     speed_before_bends,
     speed_on_path,
     stopping_speed,
 )
 from mbf_abstract.maps.controllers.room_to_turn import CREEPING
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.plugins import ControlResult
 
 AT_ONCE = InertiaParameters()
 SLOW = InertiaParameters(acc_lim_x=0.5, acc_lim_theta=0.5, control_period=0.1)
@@ -105,3 +109,69 @@ def test_the_end_of_a_path_is_no_bend():
     points = np.column_stack([np.minimum(np.arange(0.0, 1.0, 0.1), 0.45), np.zeros(10)])
     assert speed_before_bends(points, 0.1, SLOW, 1.0) > 10.0
     assert speed_before_bends(points[:3], 0.1, SLOW, 1.0) == math.inf
+
+
+@pytest.mark.parametrize("arc", [(0.6, 0.0, 0.4), (0.3, 0.0, -1.5), (-0.4, 0.0, 0.2), (0.3, 0.2, 0.1)])
+def test_an_arc_is_braked_by_what_takes_longer_and_kept(arc):
+    command, seconds = Twist.planar(*arc), 0.0
+    while command != Twist():
+        slower = SLOW.braked(command, command)
+        assert np.cross(np.array(planar(slower)), np.array(arc)) == pytest.approx(np.zeros(3))
+        assert math.hypot(command.vx - slower.vx, command.vy - slower.vy) <= 0.5 * 0.1 + 1e-9
+        assert abs(command.wz - slower.wz) <= 0.5 * 0.1 + 1e-9
+        command, seconds = slower, seconds + 0.1
+    assert seconds == pytest.approx(SLOW.stops_after(Twist.planar(*arc)), abs=0.1 + 1e-9)
+
+
+def test_a_robot_that_is_slower_than_its_command_brakes_from_what_it_does():
+    assert planar(SLOW.braked(Twist.planar(0.6, wz=0.3), Twist.planar(0.3))) == pytest.approx((0.25, 0.0, 0.125))
+    for measured in (Twist(), Twist.planar(-0.3), Twist.planar(0.04)):
+        assert SLOW.braked(Twist.planar(0.6, wz=0.3), measured) == Twist()
+
+
+def test_there_is_no_arc_to_brake_along_for_one_that_turns_on_the_spot_or_follows_at_once():
+    assert SLOW.braked(Twist.planar(wz=1.0), Twist.planar(wz=1.0)) == Twist()
+    assert AT_ONCE.braked(Twist.planar(0.6), Twist.planar(0.6)) == Twist()
+    assert AT_ONCE.time_on_arc(Twist.planar(0.6, wz=2.0)) == 0.0
+
+
+def test_what_comes_of_a_command_is_what_both_directions_can_change_together():
+    command = reached(Twist.planar(1.0, 1.0, 2.0), Twist.planar(0.5), (0.3, 0.4, 0.1))
+    assert math.hypot((command.vx - 0.5) / 0.3, command.vy / 0.4) == pytest.approx(1.0)
+    assert (command.vx - 0.5) / command.vy == pytest.approx(0.5) and command.wz == 0.1
+    near = Twist.planar(0.6, 0.1, 0.05)
+    assert planar(reached(near, Twist.planar(0.5), (0.3, 0.4, 0.1))) == pytest.approx(planar(near))
+
+
+def refused(outcome=ExePathOutcome.BLOCKED_PATH):
+    return ControlResult(outcome, "a box")
+
+
+def test_a_refusal_is_braking_along_the_last_arc_until_the_robot_stands():
+    last_arc, arc = LastFreeArc(), Twist.planar(0.4, wz=0.2)
+    last_arc.keep(arc)
+    speeds, measured = [], arc
+    while (answer := last_arc.answer(refused(), measured, SLOW)).success:
+        assert answer.message == "it brakes: a box"
+        assert answer.command.wz == pytest.approx(0.5 * answer.command.vx)
+        measured = answer.command
+        speeds.append(measured.vx)
+    assert speeds == pytest.approx([0.35, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05])
+    assert answer == refused()
+
+
+def test_it_ends_even_where_the_robot_is_measured_to_go_on():
+    last_arc, cycles = LastFreeArc(), 0
+    last_arc.keep(Twist.planar(0.4))
+    while last_arc.answer(refused(), Twist.planar(0.4), SLOW).success:
+        cycles += 1
+    assert cycles <= 8
+
+
+def test_nothing_is_braked_by_what_is_known_no_more_and_cars_have_no_arc():
+    last_arc = LastFreeArc()
+    last_arc.keep(Twist.planar(0.4))
+    stale = refused(ExePathOutcome.MAP_ERROR)
+    assert last_arc.answer(stale, Twist.planar(0.4), SLOW) == stale
+    last_arc.keep(AckermannCommand(0.4, 0.1))
+    assert last_arc.answer(refused(), Twist.planar(0.4), SLOW) == refused()

@@ -5,8 +5,9 @@ import pytest
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import AckermannCommand, Path, Twist
-from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits, cannot_turn_ahead
+from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
 from mbf_abstract.maps.controllers.standing import FORGOTTEN, Standing
+from mbf_abstract.maps.controllers.tight_places import cannot_turn_ahead
 
 PERIOD = 0.05
 STANDS = Twist()

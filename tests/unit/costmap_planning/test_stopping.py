@@ -7,9 +7,10 @@ import pytest
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.maps.controllers.inertia import InertiaParameters
 from mbf_abstract.plugins import ControlRequest
 from mbf_costmap_nav.control.path_handling import ControlCycle
-from mbf_costmap_nav.control.trajectory_scoring import stops_free
+from mbf_costmap_nav.control.trajectory_scoring import brakes_free, stops_free
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
@@ -51,6 +52,23 @@ def test_what_can_be_stopped_is_what_stops_free_when_it_is_driven(seed):
     cycle = cycle_before_a_wall(float(rng.uniform(0.4, 1.5)))
     velocity = rng.uniform(-1.0, 1.0, 3) * (1.2, 0.6, 2.0)
     assert stops_free(cycle, velocity, BRAKING, STEP) == slowly(cycle, velocity.tolist())
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_is_free_to_brake_is_so_on_its_arc_in_steps_of_a_millisecond(seed):
+    rng = np.random.default_rng(seed)
+    cycle = cycle_before_a_wall(float(rng.uniform(0.4, 1.5)))
+    vx, vy, wz = (rng.uniform(-1.0, 1.0, 3) * (1.2, 0.6, 2.0)).tolist()
+    stops_after = max(math.hypot(vx, vy) / 0.5, abs(wz) / 1.0)
+    x, y, yaw, touched = 0.0, 0.0, 0.0, False
+    for k in range(round(1000 * (0.05 + stops_after))):
+        share = min(max(1.0 - (0.001 * k - 0.05) / stops_after, 0.0), 1.0)
+        x += 0.001 * share * (vx * math.cos(yaw) - vy * math.sin(yaw))
+        y += 0.001 * share * (vx * math.sin(yaw) + vy * math.cos(yaw))
+        yaw += 0.001 * share * wz
+        touched = touched or cycle.footprint.collides(cycle.costmap, x, y, yaw)
+    inertia = InertiaParameters(acc_lim_x=0.5, acc_lim_theta=1.0, control_period=0.05)
+    assert brakes_free(cycle, np.array([vx, vy, wz]), inertia) != touched
 
 
 def test_a_robot_that_touches_something_has_to_get_out_not_to_stop():
