@@ -18,7 +18,7 @@ from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm, rotated
 from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.motion_sample import Thing
-from terrain.physics.protocols import SimulatedRobot
+from terrain.physics.protocols import PlacedRobot, SimulatedRobot
 from terrain.physics.robot_models import RobotSpec
 from terrain.physics.world import BulletWorld
 from terrain.recording.recorded_robot import RobotShape
@@ -210,7 +210,7 @@ class Fellow:
 
     thing = Thing.ROBOT
 
-    def __init__(self, robot: SimulatedRobot) -> None:
+    def __init__(self, robot: PlacedRobot) -> None:
         self._robot = robot
         spec, outline = robot.spec, robot.spec.footprint_array()
         length, width = np.ptp(outline, axis=0).tolist()

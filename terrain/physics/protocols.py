@@ -74,8 +74,8 @@ class SimulatedWorld(ABC):
         """Count a step, and move everything by it."""
 
 
-class SimulatedRobot(Protocol):
-    """A robot in such a world: ``WheeledRobot`` or ``KinematicRobot``."""
+class PlacedRobot(Protocol):
+    """A robot that stands somewhere, in a world or where it is going to start."""
 
     @property
     def spec(self) -> RobotSpec:
@@ -83,6 +83,10 @@ class SimulatedRobot(Protocol):
 
     def pose(self) -> Pose:
         """Ground truth of base_link in map."""
+
+
+class SimulatedRobot(PlacedRobot, Protocol):
+    """A robot in such a world: ``WheeledRobot`` or ``KinematicRobot``."""
 
     def velocity(self) -> Twist:
         """Ground truth of the velocity, in base_link."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -29,6 +30,7 @@ from terrain.scenarios.settings import apply_world_settings
 from terrain.scenarios.world import ScenarioWorld
 from terrain.session.navigation_config import write_navigation_config
 from terrain.session.robot_fit import notes_on_fit
+from terrain.session.site import StartingRobot, overlapping_starts
 from terrain.urdf_robots.robot_choice import RobotChoice, description_of, notes_on, spec_of
 from terrain.worlds.generate import flat_terrain
 from terrain.worlds.map_files import MapFiles
@@ -139,6 +141,7 @@ def _check_world(
         world, _ = build_environment(with_noise(scenario), folder, scenario.seed if seed is None else seed)
         try:
             _check_places(scenario, world, document, findings)
+            _check_starts(scenario, world, document, findings)
         finally:
             world.physics.close()
         return world.files
@@ -166,6 +169,16 @@ def _check_places(scenario: Scenario, world: ScenarioWorld, document: YamlDocume
             if obstacle.holds(pose.x, pose.y) and apart < obstacle.size[2]:
                 at = f"({pose.x:g}, {pose.y:g}), inside of obstacles[{number}]"
                 findings.append(document.finding(key, "a place outside the obstacles", at))
+
+
+def _check_starts(scenario: Scenario, world: ScenarioWorld, document: YamlDocument, findings: list[Finding]) -> None:
+    """Compare the starts of several robots, once each of them is a place."""
+    robots: dict[str, StartingRobot] = {}
+    with suppress(ConfigError):  # _check_places has reported it
+        for name, view in robot_scenarios(scenario).items():
+            if view.start is not None:
+                robots[name] = StartingRobot(spec_of(view.robot), world.pose_of(view.start))
+        findings += map(document.located, overlapping_starts(robots))
 
 
 def _check_server(

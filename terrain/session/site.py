@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.geometry import Pose
 from mbf_abstract.time.clock import Clock, WallClock
 from mbf_abstract.time.sim_clock import SimClock
 from terrain.physics.actors import Fellow
@@ -14,7 +16,8 @@ from terrain.physics.contact_depth import placed
 from terrain.physics.kinematic_robot import KinematicRobot
 from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.motion_sample import Thing
-from terrain.physics.robot_models import Drive
+from terrain.physics.protocols import PlacedRobot
+from terrain.physics.robot_models import Drive, RobotSpec
 from terrain.physics.robots import WheeledRobot
 from terrain.scenarios.environment import build_environment
 from terrain.scenarios.perturbation import DrawnError, draw_disturbance
@@ -107,8 +110,20 @@ class Site:
         self._temporary.cleanup()
 
 
-def _refuse_overlaps(scenario: Scenario, robots: Mapping[str, AnyRobot]) -> None:
-    """Raise ConfigError where the outlines of two robots overlap at their starts."""
+@dataclass(frozen=True)
+class StartingRobot:
+    """A robot where it is going to start, before its world is simulated."""
+
+    spec: RobotSpec
+    start: Pose
+
+    def pose(self) -> Pose:
+        """Pose of base_link in map."""
+        return self.start
+
+
+def overlapping_starts(robots: Mapping[str, PlacedRobot]) -> list[Finding]:
+    """Return a finding for each two robots whose outlines overlap; they come in the order of the scenario."""
     findings = []
     names = list(robots)
     for number, name in enumerate(names):
@@ -120,6 +135,11 @@ def _refuse_overlaps(scenario: Scenario, robots: Mapping[str, AnyRobot]) -> None
             if apart < fellow.size[-1] and fellow.gap(corners) == 0.0:
                 key, at = f"robots[{number}].start", f"({pose.x:.2f}, {pose.y:.2f})"
                 findings.append(Finding("scenario", 1, key, f"a place that {other!r} does not stand in", at))
+    return findings
+
+
+def _refuse_overlaps(scenario: Scenario, robots: Mapping[str, AnyRobot]) -> None:
+    findings = overlapping_starts(robots)
     if findings:
         drawn = any(robot.perturb.start_position for robot in robot_scenarios(scenario).values())
         raise (DrawnError if drawn else ConfigError)(findings)

@@ -338,15 +338,21 @@ def test_a_check_that_no_package_knows_is_that_of_a_configuration(tmp_path):
     assert result.exit_code == 2 and "an empty file" in result.output
 
 
-def test_robots_that_stand_in_each_other_are_named_with_file_and_line(tmp_path):
+@pytest.mark.parametrize("command", [["run", "--quiet", "--out", "run"], ["check"]], ids=["run", "check"])
+@pytest.mark.parametrize("backend", ["mesh", "costmap"])
+@pytest.mark.parametrize("physics", ["kinematic", "bullet"])
+def test_robots_that_stand_in_each_other_are_named_with_file_and_line(tmp_path, monkeypatch, command, backend, physics):
+    monkeypatch.chdir(tmp_path)
     robots = "[{name: anna, start: {x: 2.0, y: 2.0}, goals: [{x: 3.0, y: 2.0}]},\n"
     robots += "  {name: ben, start: {x: 2.1, y: 2.0}, goals: [{x: 3.0, y: 3.0}]}]"
-    scenario = write(tmp_path, [("trial.yaml", "robots", robots, ""), ("trial.yaml", "physics", "kinematic", "")])
+    scenario = write(tmp_path, [("trial.yaml", "robots", robots, ""), ("trial.yaml", "physics", physics, "")])
     scenario.write_text(
         "".join(f"{line}\n" for line in scenario.read_text().splitlines() if line[:5] not in ("start", "goals"))
     )
 
-    result = mbf("run", scenario, "--out", tmp_path / "run", "--quiet")
+    scenario.write_text(scenario.read_text().replace("backend: mesh", f"backend: {backend}"))
 
-    assert result.exit_code == 2
+    result = mbf(*command, scenario)
+
+    assert result.exit_code == 2 and "1 mistake found" in result.output
     assert f"{scenario}:8: robots[1].start: expected a place that 'anna' does not stand in" in result.output
