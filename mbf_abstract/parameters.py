@@ -88,6 +88,7 @@ def parameter(
     unit: str = "",
     was: str = "",
     dynamic: bool = True,
+    reads_file: bool = False,
     ge: float | None = None,
     gt: float | None = None,
     le: float | None = None,
@@ -108,6 +109,8 @@ def parameter(
         Its earlier name, which is refused with a hint to this one.
     dynamic : bool
         Whether a change at run time takes effect on running goals; otherwise it is read when a goal starts.
+    reads_file : bool
+        Whether a text that is not empty names a file, which has to be there.
     ge, gt, le, lt : float, optional
         Bounds of the legal range.
     allow_inf : bool
@@ -121,5 +124,5 @@ def parameter(
         le=le,
         lt=lt,
         allow_inf_nan=True if allow_inf else None,
-        json_schema_extra={"unit": unit, "was": was, "dynamic": dynamic},
+        json_schema_extra={"unit": unit, "was": was, "dynamic": dynamic, "reads_file": reads_file},
     )

@@ -58,6 +58,7 @@ def plan(
     from_place, to_place = parse_place(start, "--start"), parse_place(goal, "--goal")
     with readable_errors():
         from mbf_abstract.commands.plan_picture import draw_plan
+        from mbf_abstract.commands.survey_places import refuse_elsewhere, survey_of
         from mbf_abstract.compiling.compilation import record_compilations
         from mbf_abstract.goals.goal_types import GetPathGoal
         from mbf_abstract.server.standing_server import place_robot, planned, read_config_or_map, standing_server
@@ -68,7 +69,9 @@ def plan(
             with waiting("building the map and its layers"):
                 server = open_server.enter_context(standing_server(cls, checked))
             notes += server.notes
-            surveyed = _survey_of(server, config) if survey else None
+            surveyed = survey_of(server, config) if survey else None
+            if surveyed is not None:
+                refuse_elsewhere(surveyed, config, start=from_place, goal=to_place)
             start_pose = _pose("start", from_place, server, notes, surveyed)
             goal_pose = _pose("goal", to_place, server, notes, surveyed)
             place_robot(server, start_pose)
@@ -86,16 +89,6 @@ def plan(
     _report(result, seconds, notes, as_json, surveyed)
     if not result.success:
         raise typer.Exit(FAILURE)
-
-
-def _survey_of(server: AbstractNavigationServer, config: Path) -> Survey:
-    """The survey of the map; ConfigError where there is none."""
-    from mbf_abstract.config.findings import ConfigError, Finding
-
-    if server.survey is None:
-        expected = "a map whose file states its survey (GeoTIFF, ESRI ASCII, SRTM, a map of mbf map build)"
-        raise ConfigError([Finding(str(config), 1, "", expected, "--survey with another one")])
-    return server.survey
 
 
 def _pose(

@@ -41,6 +41,14 @@ class ArrayFileError(ValueError):
     """A file of arrays is damaged, or holds more than its reader's limit; the text does not name the file."""
 
 
+def is_there(path: Path) -> bool:
+    """Whether there is a file, a folder or anything else of this name."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # a name that is too long, or has a null character
+        return False
+
+
 def special_file(path: Path) -> str:
     """What a path is if it is no file with contents: "a pipe", "a socket" or "a device"; "" otherwise.
 

@@ -14,6 +14,8 @@ from types import MappingProxyType
 from typing import Any
 
 from mbf_abstract.config.configuration import Config
+from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.named_files import missing_files
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import TransformError
@@ -47,9 +49,11 @@ class MapServer(AbstractNavigationServer):
         """Parameters of a map that stand for an outline of the robot, see ``set_footprint``; raises ValueError."""
 
     def load_map(self, config: Config) -> None:
-        """Build the maps and begin to update them."""
+        """Build the maps and begin to update them; ConfigError names all files that are missing."""
         self.served = {}
         self._contact_guard = ContactGuard()
+        if missing := missing_files(config):
+            raise ConfigError(missing)
         for served in self.serve_maps(config):
             self.served[served.name] = served  # at once: what is there is closed if the next one fails
         self._scans = ScanIntake(self.runtime, self.served)

@@ -33,7 +33,7 @@ from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import with_changes
 from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
 from mbf_abstract.server.map_interface import MapInterface
-from mbf_abstract.server.plugin_notes import MapNotes, notes_on_plugins
+from mbf_abstract.server.plugin_notes import MapNotes, notes_on_numbers, notes_on_plugins
 from mbf_abstract.server.process_end import ProcessEndWatch
 from mbf_abstract.time.clock import Clock
 from mbf_abstract.time.sim_clock import SimClock
@@ -102,7 +102,9 @@ class AbstractNavigationServer(MapInterface):
             f"left out: optional {skipped.kind.name.lower()} {skipped.name!r}: {skipped.reason}"
             for skipped in self.config.skipped
         )
-        return (*left_out, *self.map_notes, *notes_on_plugins(self.plugins, self.runtime, self.car_controllers))
+        numbers = notes_on_numbers(self.config, self.plugins, self.runtime)
+        of_plugins = notes_on_plugins(self.plugins, self.runtime, self.car_controllers)
+        return (*left_out, *self.map_notes, *numbers, *of_plugins)
 
     # --------------------------------------------------------------------------------------- parameters
     def set_parameters(self, **changes: Any) -> None:

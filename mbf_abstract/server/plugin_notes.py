@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from mbf_abstract.actions.meetings import own_distance
+from mbf_abstract.config.configuration import Config
+from mbf_abstract.config.implausible import implausible_values
 from mbf_abstract.event_bus import EventBus
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.execution.runtime import Runtime
@@ -37,6 +39,18 @@ class MapNotes:
     def _reported(self) -> tuple[Event, ...]:
         kept = self._events.memory
         return kept.of_kind(EventKind.MAP) if kept else ()
+
+
+def notes_on_numbers(config: Config, plugins: PluginTable, runtime: Runtime) -> Iterator[str]:
+    """Yield a note for every number of the server, its plugins, maps and layers that is hardly in the right unit."""
+    yield from implausible_values(runtime.parameters)
+    for kind in PluginKind:
+        for plugin in plugins.all_of(kind):
+            yield from implausible_values(plugin.instance.parameters, f"{kind.name.lower()} {plugin.name!r}: ")
+    for name, section in config.sections.items():
+        yield from implausible_values(section.parameters, f"{name}: ")
+        for layer in section.layers:
+            yield from implausible_values(layer.parameters, f"{name}: layer {layer.name!r}: ")
 
 
 def notes_on_plugins(plugins: PluginTable, runtime: Runtime, car_controllers: Sequence[str]) -> Iterator[str]:

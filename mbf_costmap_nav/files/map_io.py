@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
-from mbf_abstract.config.bounded_files import special_file
+from mbf_abstract.config.bounded_files import is_there, special_file
 from mbf_abstract.config.findings import describe_value
+from mbf_abstract.config.yaml_source import load_yaml
 from mbf_costmap_nav.files.map_description import (
     OCCUPIED,
     UNKNOWN_OCCUPANCY,
@@ -141,6 +142,9 @@ def load_map(file: Path | str, max_cells: int = MAX_CELLS, *, confined: bool = F
     if confined and not _lies_in(image, file.parent):
         got = describe_value(description.image)
         raise MapError(file, f"image: expected a file in the folder of the map (confine_images), got {got}")
+    if not is_there(image):
+        finding = load_yaml(file).finding(("image",), "an image", f"{description.image!r} (no file {image})")
+        raise MapError(file, f"{finding.key}: expected {finding.expected}, got {finding.got}", [finding])
     return _decode(image, max_cells, description)
 
 

@@ -43,7 +43,7 @@ class StaticLayerParameters(LayerParameters):
     """Parameters of the static layer."""
 
     map_file: str = parameter(
-        "", "map_server YAML file or image, relative to the configuration's folder.", dynamic=False
+        "", "map_server YAML file or image, relative to the configuration's folder.", dynamic=False, reads_file=True
     )
     map_frame: str = parameter("", "Frame of the map file's origin; empty = the costmap's.", dynamic=False)
     map_topic: str = parameter(

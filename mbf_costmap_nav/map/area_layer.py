@@ -20,8 +20,8 @@ class AreaLayerParameters(LayerParameters):
     """Where the areas of a layer come from."""
 
     zones: tuple[Zone, ...] = parameter((), "Polygons written in place; those of the file stay when they change.")
-    zones_file: str = parameter("", "YAML file with more polygons.", dynamic=False)
-    mask_file: str = parameter("", "map_server YAML file of a mask image.", dynamic=False)
+    zones_file: str = parameter("", "YAML file with more polygons.", dynamic=False, reads_file=True)
+    mask_file: str = parameter("", "map_server YAML file of a mask image.", dynamic=False, reads_file=True)
     map_frame: str = parameter("", "Frame of zones and mask; empty = the costmap's.", dynamic=False)
 
 

@@ -33,7 +33,9 @@ class MeshLayerEntry(LayerEntry):
 class MeshMapParameters(OutlineParameters):
     """Parameters of the ``mesh_map`` block, beside the blocks of the layers."""
 
-    mesh_file: str = parameter("", "File of the mesh; empty if the mesh is given as arrays.", dynamic=False)
+    mesh_file: str = parameter(
+        "", "File of the mesh; empty if the mesh is given as arrays.", dynamic=False, reads_file=True
+    )
     mesh_part: str = parameter("", "Part of the file: path through the scene graph, or HDF5 group.", dynamic=False)
     up_axis: Literal["", "x", "y", "z"] = parameter(
         "",

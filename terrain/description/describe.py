@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.implausible import implausible_values
 from mbf_abstract.geometry import FloatArray
 from terrain.description.description import RobotDescription
 from terrain.description.masses import mass_of, notes_on_masses, some_of
@@ -64,7 +65,7 @@ class _Describer:
         self, urdf: Urdf, stated: UrdfRobot, frames: Mapping[str, FloatArray], gear: RunningGear, base: FloatArray
     ) -> None:
         self.urdf, self.stated, self.frames, self.gear, self.base = urdf, stated, frames, gear, base
-        self.notes = [*urdf.notes, *notes_on_masses(urdf, frames)]
+        self.notes = [*urdf.notes, *implausible_values(stated), *notes_on_masses(urdf, frames)]
         seen = [name for name, link in urdf.links.items() if link.only_seen]
         if seen:
             self.notes.append(f"{some_of(seen)}: no collision shape, so not part of footprint, height and clearance")

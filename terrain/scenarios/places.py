@@ -12,6 +12,8 @@ from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.parameters import ParameterModel, parameter
 
+FARTHEST = 10_000.0
+"""Coordinates [m] up to which the physics, in single precision, resolves a millimetre."""
 FULL_TURN = 6.2832
 """Largest heading [rad]; what is beyond was meant in degrees."""
 
@@ -44,4 +46,7 @@ def coordinates(places: Iterable[Place | None]) -> FloatArray:
 
 def off_the_ground(key: str, x: float, y: float) -> ConfigError:
     """Return the error about a ``key`` of the scenario that has no ground at (x, y) [m]."""
-    return ConfigError([Finding("scenario", 1, key, "a place on the ground of the world", f"({x:g}, {y:g})")])
+    far = max(abs(x), abs(y)) > FARTHEST
+    hint = "metres from the corner of the world are meant, not coordinates of a survey" if far else ""
+    expected, got = "a place on the ground of the world", f"({x:.10g}, {y:.10g})"
+    return ConfigError([Finding("scenario", 1, key, expected, got, hint)])

@@ -27,7 +27,7 @@ from terrain.scenarios.perturbation import Perturbation
 from terrain.scenarios.places import Place, PlanarPose
 from terrain.scenarios.robots import OwnRobot, Sensor
 from terrain.scenarios.world_types import LevelsWorld, MapWorld, TerrainWorld, World
-from terrain.urdf_robots.robot_choice import RobotChoice, find_wrong_robot, is_legged, located
+from terrain.urdf_robots.robot_choice import RobotChoice, find_wrong_robot, is_legged, located, missing_urdf
 
 __all__ = ["MapWorld", "Obstacle", "PlanarPose", "Scenario", "Sensor", "load_scenario"]
 
@@ -178,6 +178,8 @@ def _keys_of(scenario: Scenario, number: int, *keys: str | int) -> KeyPath:
 def _find_contradictions_of(scenario: Scenario, document: YamlDocument, at: Callable[..., KeyPath]) -> list[Finding]:
     """Find what is wrong together in what one robot drives; ``at`` returns where a value of it stands."""
     findings = find_wrong_robot(scenario.robot)
+    if missing := missing_urdf(scenario.robot, document.path.parent):
+        findings = [document.finding(at("robot"), "a URDF", missing)]
     if not findings and scenario.physics != "kinematic" and is_legged(scenario.robot):
         expected = "kinematic, for a robot on legs, whose gait is not simulated"
         findings.append(document.finding(("physics",), expected, scenario.physics))

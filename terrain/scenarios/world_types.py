@@ -14,10 +14,12 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from mbf_abstract.config.bounded_files import is_there
 from mbf_abstract.config.findings import ConfigError, Finding, refused_at
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.scenarios.features import Feature, put_on
+from terrain.scenarios.places import FARTHEST
 from terrain.worlds.elevation_files import TerrainFileError, jacksboro, read_dem
 from terrain.worlds.floor_plan import OFFICE_MAP, read_floor_plan
 from terrain.worlds.generate import flat_terrain, fractal_terrain
@@ -27,9 +29,6 @@ from terrain.worlds.multi_level import MultiLevelWorld, bridge_over_road, parkin
 from terrain.worlds.occupancy import OccupancyGrid, read_occupancy
 from terrain.worlds.slope_map import LETHAL_SLOPE
 from terrain.worlds.surface import NO_SURFACE
-
-FARTHEST = 10_000.0
-"""Coordinates [m] up to which the physics, in single precision, resolves a millimetre."""
 
 
 class TerrainWorld(ParameterModel):
@@ -144,6 +143,8 @@ class MapWorld(BuildingWorld):
 
     def grid(self) -> OccupancyGrid:
         """Read the map."""
+        if not is_there(self.file) or self.file.is_dir():
+            raise ConfigError([Finding("scenario", 1, "world.file", "a map", f"no file {self.file}")])
         grid = read_occupancy(self.file)
         if self.corner is not None:
             return replace(grid, origin_x=self.corner[0], origin_y=self.corner[1])

@@ -160,7 +160,7 @@ def _check_places(scenario: Scenario, world: ScenarioWorld, document: YamlDocume
         try:
             pose = world.pose_of(place)
         except ConfigError as error:
-            findings += [document.finding(key, wrong.expected, wrong.got) for wrong in error.findings]
+            findings += [document.finding(key, wrong.expected, wrong.got, wrong.hint) for wrong in error.findings]
             continue
         if world.has_wall_at(pose):
             findings.append(document.finding(key, "a place outside the walls", f"({pose.x:g}, {pose.y:g})"))

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Discriminator, Tag
 from mbf_abstract.config.findings import ConfigError, Finding
 from terrain.description.describe import describe
 from terrain.description.description import RobotDescription
-from terrain.description.mesh_files import find_file
+from terrain.description.mesh_files import find_file, missing_text
 from terrain.description.parameters import UrdfRobot
 from terrain.description.running_gear import sides_of
 from terrain.physics.robot_models import ROBOTS, Drive, RobotSpec
@@ -60,6 +60,13 @@ def located(choice: str | UrdfRobot, folder: Path) -> str | UrdfRobot:
         return choice
     file = find_file(choice.urdf, folder)
     return choice if file is None else choice.model_copy(update={"urdf": str(file.absolute())})
+
+
+def missing_urdf(choice: str | UrdfRobot, folder: Path) -> str:
+    """Where a URDF was looked for that is not there, relative ones from ``folder``; empty if nothing is missing."""
+    if isinstance(choice, str) or find_file(choice.urdf, folder) is not None:
+        return ""
+    return missing_text(choice.urdf, folder)
 
 
 def description_of(choice: str | UrdfRobot) -> RobotDescription:

@@ -168,11 +168,11 @@ def test_places_maps_and_plugins_are_checked_in_the_world_together_with_the_rest
         ("trial.yaml", "start"),
         ("trial.yaml", "goals[1]"),
         ("mesh.yaml", "dist_tolerance"),
-        ("costmap.yaml", ""),
+        ("costmap.yaml", "global_costmap.zones.mask_file"),
     }
     assert found(report, tmp_path) == expected
     text = "\n".join(finding.text for finding in report.findings)
-    assert f"{tmp_path}/no.yaml" in text and "mbf_check_" not in text, "files are named as their author knows them"
+    assert "'no.yaml'" in text and "mbf_check_" not in text, "files are named as their author knows them"
     result = mbf("check", scenario)
     assert result.exit_code == 2
     assert all(finding.text in result.output for finding in report.findings)
@@ -356,3 +356,9 @@ def test_robots_that_stand_in_each_other_are_named_with_file_and_line(tmp_path, 
 
     assert result.exit_code == 2 and "1 mistake found" in result.output
     assert f"{scenario}:8: robots[1].start: expected a place that 'anna' does not stand in" in result.output
+
+
+def test_coordinates_of_a_survey_are_printed_whole_and_named_as_such(tmp_path):
+    scenario = write(tmp_path, [("trial.yaml", "goals", "[{x: 556480.5, y: 5394960.0}]", "")])
+    expected = "goals[0]: expected a place on the ground of the world, got (556480.5, 5394960) (metres from the corner"
+    assert expected in mbf("check", scenario).output
