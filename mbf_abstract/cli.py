@@ -12,6 +12,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+import warnings
 from collections.abc import Callable
 from importlib.metadata import EntryPoint, version
 from typing import Any
@@ -75,11 +76,17 @@ def _add_commands(app: typer.Typer, point: EntryPoint) -> None:
 def main() -> None:
     """Run the command line."""
     os.environ.setdefault(BLAS_THREADS, "1")  # numpy reads it when it is imported, which commands do
+    warnings.showwarning = _print_warning
     gc.set_threshold(YOUNG_OBJECTS, *gc.get_threshold()[1:])
     app = make_app()
     if not any(name.startswith("_") and name.endswith("_COMPLETE") for name in os.environ):  # a shell asks for words
         keep_parameters_of(app, sys.argv[1] if len(sys.argv) > 1 else "")
     app()
+
+
+def _print_warning(message: Warning | str, *_where: Any, **_text: Any) -> None:
+    """Print a warning as a line: where in the code it comes from says nothing to who has typed a command."""
+    typer.echo(f"warning: {message}", err=True)
 
 
 def keep_parameters_of(app: typer.Typer, wanted: str) -> None:

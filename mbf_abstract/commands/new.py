@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import keyword
 import shlex
+import shutil
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,6 +19,7 @@ import typer
 
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.config.installed_plugins import installed_points
+from mbf_abstract.whole_files import write_whole
 
 GROUPS = {"planner": "planners", "controller": "controllers", "recovery": "recoveries", "layer": "{map}_layers"}
 """Kind of a plugin -> last word of its entry-point group."""
@@ -49,7 +51,7 @@ def new(
 
     A planner and a layer need a map. An executive runs on every one; a controller and a recovery may.
     """
-    with readable_errors():
+    with readable_errors(out):
         package = write_package(kind, name.replace("-", "_"), map_name, out)
     typer.echo(f"wrote {package}")
     typer.echo(f"next: pip install -e {shlex.quote(f'{package}[test]')} && pytest {shlex.quote(str(package))}")
@@ -74,9 +76,13 @@ def write_package(kind: str, name: str, map_name: str, out: Path) -> Path:
         raise ValueError(f"the name {name!r} is taken by {taken}: choose another one")
     package = out / name
     package.mkdir(parents=True)
-    (package / "tests").mkdir()
-    for file, text in texts.items():
-        (package / file).write_text(text, encoding="utf-8")
+    try:
+        (package / "tests").mkdir()
+        for file, text in texts.items():
+            write_whole(package / file, text)
+    except OSError:  # the disk is full: the next try would find the folder taken
+        shutil.rmtree(package, ignore_errors=True)
+        raise
     return package
 
 

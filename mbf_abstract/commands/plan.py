@@ -56,7 +56,7 @@ def plan(
     Without Z the lowest free ground is taken; on a flat map three numbers are X Y YAW.
     """
     from_place, to_place = parse_place(start, "--start"), parse_place(goal, "--goal")
-    with readable_errors():
+    with readable_errors(png):
         from mbf_abstract.commands.plan_picture import draw_plan
         from mbf_abstract.commands.survey_places import refuse_elsewhere, survey_of
         from mbf_abstract.compiling.compilation import record_compilations

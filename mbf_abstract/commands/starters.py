@@ -7,6 +7,7 @@ gets this command by adding such a folder.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shlex
@@ -19,6 +20,7 @@ import typer
 from mbf_abstract.commands.completion import starting_with
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.config.installed_plugins import installed_points
+from mbf_abstract.whole_files import write_whole
 
 PLACEHOLDER = "$map_file"
 
@@ -43,7 +45,7 @@ def config(
     out: Path | None = typer.Option(None, "--out", help="File to write it to; printed if not given."),
 ) -> None:
     """Write a configuration to start from: one that passes mbf check, for a map and a typical robot."""
-    with readable_errors():
+    with readable_errors(out):
         if not name:
             typer.echo(listing())
             return
@@ -51,8 +53,9 @@ def config(
         if out is None:
             typer.echo(text, nl=False)
             return
-        with out.open("x", encoding="utf-8") as file:
-            file.write(text)
+        if out.exists():
+            raise FileExistsError(errno.EEXIST, "there is such a file already; nothing is overwritten", str(out))
+        write_whole(out, text)
     typer.echo(f"wrote {out}")
     typer.echo(f"next: set speeds, outline and sensors to those of your robot, then mbf check {shlex.quote(str(out))}")
 

@@ -126,9 +126,10 @@ def _sources(*folders: Path) -> str:
 
 @lru_cache
 def _warn_that_nothing_is_kept() -> None:
+    stated = f"NUMBA_CACHE_DIR ({config.CACHE_DIR}), " if config.CACHE_DIR else ""
     text = (
-        "compiled kernels cannot be kept, so every process compiles them anew: neither the folder of the package nor "
-        "the home folder can be written to; set NUMBA_CACHE_DIR to a folder of your own"
+        f"compiled kernels cannot be kept, so every process compiles them anew: neither {stated}the folder of the "
+        "package nor the home folder can be written to; set NUMBA_CACHE_DIR to a folder of your own"
     )
     warnings.warn(text, stacklevel=4)
 

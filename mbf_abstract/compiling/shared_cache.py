@@ -7,8 +7,10 @@ different types at the same moment would give both the same name, and one would 
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
@@ -36,9 +38,17 @@ class SharedCache(FunctionCache):  # type: ignore[misc]
             return self._load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Save the machine code for one signature."""
-        with locked(Path(self.cache_path) / ".lock"):
-            super().save_overload(sig, data)
+        """Save the machine code for one signature; without room for it on the disk a warning says so, once."""
+        try:
+            with locked(Path(self.cache_path) / ".lock"):
+                super().save_overload(sig, data)
+        except OSError as error:
+            _warn_that_it_is_not_kept(str(Path(self.cache_path).parent), error.strerror or str(error))
+
+
+@lru_cache
+def _warn_that_it_is_not_kept(folder: str, reason: str) -> None:
+    warnings.warn(f"compiled kernels cannot be kept in {folder}: {reason}", stacklevel=3)
 
 
 def share_cache(dispatcher: Any, function: Callable[..., Any]) -> Any:

@@ -110,8 +110,8 @@ def text_of(error: Exception) -> str:
             (".".join(map(str, one["loc"])) or "parameters", one["msg"], one.get("input")) for one in error.errors()
         ]
         return "\n".join(f"{name}: {text[:1].lower()}{text[1:]}, got {value!r:.60}" for name, text, value in wrong)
-    if isinstance(error, OSError) and error.filename is not None and error.strerror:
-        return f"{error.filename}: {error.strerror}"
+    if isinstance(error, OSError) and error.strerror:  # without the number in brackets
+        return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
     if isinstance(error, MemoryError):
         return f"not enough memory for that: {error}".removesuffix(": ")
     return str(error).strip() or type(error).__name__

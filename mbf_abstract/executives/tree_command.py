@@ -7,6 +7,7 @@ from pathlib import Path
 import typer
 
 from mbf_abstract.commands.reporting import readable_errors
+from mbf_abstract.whole_files import write_whole
 
 
 def register(app: typer.Typer) -> None:
@@ -31,7 +32,7 @@ def show(
     out: Path | None = typer.Option(None, "--out", help="Write into this file instead of the terminal."),
 ) -> None:
     """Draw a tree."""
-    with readable_errors():
+    with readable_errors(out):
         from mbf_abstract.executives.reference_trees import REFERENCE_TREES
         from mbf_abstract.executives.tree_drawing import FORMATS, draw_tree
 
@@ -43,4 +44,4 @@ def show(
         if out is None:
             typer.echo(drawing, nl=False)
         else:
-            out.write_text(drawing, encoding="utf-8")
+            write_whole(out, drawing)

@@ -61,7 +61,7 @@ def build(
 
     Ground, bridges and storeys become triangles. There are none where something stands or nothing was measured.
     """
-    with readable_errors():
+    with readable_errors(out):
         from mbf_mesh_nav.building.map_build import build_map
         from mbf_mesh_nav.building.map_facts import lines_of
         from mbf_mesh_nav.building.surface import SurfaceParameters

@@ -31,7 +31,7 @@ def tile(
     as_json: bool = typer.Option(False, "--json", help="Print the figures as one JSON object."),
 ) -> None:
     """Cut a map into tiles, compute their layers and what it costs to pass them."""
-    with readable_errors():
+    with readable_errors(out):
         from mbf_abstract.server.factory import read_config
         from mbf_abstract.server.standing_server import read_config_text
         from mbf_mesh_nav.files.vertex_errors import read_vertex_errors

@@ -53,7 +53,7 @@ def replay(
     place = parse_place(goal, "--goal") if goal else None
     if place is None and (math.isfinite(at) or planner):
         raise typer.BadParameter("it goes with --goal only", param_hint="--at" if math.isfinite(at) else "--planner")
-    with readable_errors():
+    with readable_errors(out):
         from mbf_abstract.drive_log import write_drive_log
         from mbf_abstract.server.factory import read_config
         from mbf_ros.bags.reading import open_bag
@@ -91,7 +91,7 @@ def recorded_map(
     at: float = typer.Option(math.inf, "--at", min=0.0, help="The map so many seconds after the beginning."),
 ) -> None:
     """Write the recorded map, the last one or that of a time, as a file for static layers."""
-    with readable_errors():
+    with readable_errors(out):
         from mbf_ros.bags.reading import open_bag
         from mbf_ros.bags.recorded_map import map_topic, read_recorded_map, write_recorded_map
 
@@ -120,7 +120,7 @@ def points(
     every: int = typer.Option(1, "--every", min=1, help="Take every n-th scan of a topic."),
 ) -> None:
     """Write what the sensors hit, in one frame, as a point cloud for mbf map build."""
-    with readable_errors():
+    with readable_errors(out):
         from mbf_ros.bags.reading import open_bag
         from mbf_ros.bags.recorded_points import PointOptions, read_recorded_points, write_points
         from mbf_ros.bags.replay_options import ReplayOptions
@@ -142,7 +142,7 @@ def export(
     robot_frame: str = typer.Option("base_link", "--robot-frame", help="Name of the robot's frame in the bag."),
 ) -> None:
     """Write a run as a bag of ROS 2 (mcap) with standard messages; the same run gives the same bytes."""
-    with readable_errors():
+    with readable_errors(out):
         from mbf_abstract.drive_log import read_drive_log
         from mbf_ros.bags.export import messages_of
         from mbf_ros.bags.writing import write_bag

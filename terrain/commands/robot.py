@@ -35,7 +35,7 @@ def show(
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object."),
 ) -> None:
     """Print what is found in a URDF: wheels and drive, outline, masses, and slopes, ramps and crests it can take."""
-    with readable_errors():
+    with readable_errors(png):
         from terrain.description.describe import describe
         from terrain.description.facts import lines_of, to_json
         from terrain.description.parameters import stated_robot

@@ -114,7 +114,7 @@ def run(
     if not ros2:
         refuse_without(context, "--ros2", "ros2_stamped", "ros2_lockstep", "ros2_patience")
     folder = out or new_run_folder(RUNS, datetime.now())
-    with readable_errors():
+    with readable_errors(folder):
         from terrain.commands.live_line import LiveLine
         from terrain.session.runner import RunOptions
         from terrain.viewer.results import write_joint_results, write_results

@@ -48,7 +48,7 @@ def sweep(
     With several variants each pair of them is tested seed by seed, in success and in every metric; p is corrected
     for the number of all these tests (Holm).
     """
-    with readable_errors():
+    with readable_errors(out):
         from rich.console import Console
         from rich.markup import escape
         from rich.progress import track

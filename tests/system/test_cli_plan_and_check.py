@@ -271,7 +271,7 @@ def test_a_tilde_in_the_name_of_a_map_is_the_home_folder(backend, half_known, hi
         config.write_text(f"backend: {backend}\n" + section.replace("FOLDER", folder))
         result = mbf("check", config)
         assert result.exit_code == exit_code, result.output
-    assert str(tmp_path / "~nobody-of-this-name") in result.output
+    assert f"{config}:2: " in result.output and "'~nobody-of-this-name/" in result.output
 
 
 def test_check_finds_a_choice_of_maps_where_there_is_one_only_without_loading_it(hill, tmp_path):

@@ -75,7 +75,7 @@ def outdoor(
 ) -> None:
     """Judge your planner or controller on rough ground, beside the shipped ones."""
     asked = _asked(context)
-    with readable_errors():
+    with readable_errors(out):
         from terrain.experiments.evaluation.bench import bench
         from terrain.experiments.evaluation.outdoor import outdoor as protocol
 
@@ -102,7 +102,7 @@ def indoor(
 ) -> None:
     """Judge your planner or controller among posts that only a lidar sees, beside the shipped ones."""
     asked = _asked(context)
-    with readable_errors():
+    with readable_errors(out):
         from terrain.experiments.evaluation.bench import bench
         from terrain.experiments.evaluation.indoor import indoor as protocol
 
@@ -132,7 +132,7 @@ def moving(
 ) -> None:
     """Judge your planner or controller among people who walk, beside the shipped ones."""
     asked = _asked(context)
-    with readable_errors():
+    with readable_errors(out):
         from terrain.experiments.evaluation.bench import bench
         from terrain.experiments.evaluation.moving import moving as protocol
 
@@ -160,7 +160,7 @@ def everything(
     if beside not in ([], ["all"]):
         raise typer.BadParameter(f"expected all, as the sets have entries of their own, got {' '.join(beside)!r}")
     asked = _asked(context)
-    with readable_errors():
+    with readable_errors(out):
         from terrain.experiments.evaluation import indoor as posts
         from terrain.experiments.evaluation import moving as people
         from terrain.experiments.evaluation import outdoor as ground

@@ -31,7 +31,7 @@ def table1(
     out: Path = typer.Option(Path("runs/table1"), "--out", help="Folder for results; runs that it holds are kept."),
 ) -> None:
     """Compare a behaviour tree with move_base's fixed state machine, as Table I of the Move Base Flex paper did."""
-    with readable_errors():
+    with readable_errors(out):
         from rich.console import Console
 
         from terrain.experiments.table1.campaign import Campaign, Job

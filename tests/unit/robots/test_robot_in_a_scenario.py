@@ -81,7 +81,7 @@ def test_a_text_and_a_block_name_the_same_robot_beside_the_scenario(scenario, tm
     ("text", "expected"),
     [
         ("huskey", "robot: expected husky, turtlebot, car, a file .urdf, or a block"),
-        ("gone.urdf", "urdf: expected a file, got 'gone.urdf'"),
+        ("gone.urdf", "robot: expected a URDF, got 'gone.urdf'"),
         ("{urdf: my.urdf, drive: hover}", "robot.drive: expected 'differential'"),
         (
             "{urdf: my.urdf, center_of_mass: [0.0, 0.0, 0.0]}",
