@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 from mbf_abstract.config.bounded_files import configured_file, is_there
 from mbf_abstract.config.configuration import Config
-from mbf_abstract.config.findings import Finding, KeyPath
+from mbf_abstract.config.findings import ConfigError, KeyPath
 from mbf_abstract.config.yaml_source import YamlDocument, read_yaml
 from mbf_abstract.parameters import ParameterModel
 
 
-def missing_files(config: Config) -> list[Finding]:
-    """Return a finding for each parameter of a map section or layer with ``reads_file`` whose file is not there."""
+def refuse_missing_files(config: Config) -> None:
+    """Raise ConfigError about all parameters of maps and layers whose file (``reads_file``) is not there."""
     document = read_yaml(config.path, []) or YamlDocument(config.path, {})
     findings = []
     for path, parameters in _blocks(config):
@@ -21,7 +21,8 @@ def missing_files(config: Config) -> list[Finding]:
             value = getattr(parameters, name) if isinstance(extra, dict) and extra.get("reads_file") else ""
             if value and not is_there(configured_file(config.path.parent, value)):
                 findings.append(document.finding((*path, name), "a file", f"{value!r}, which is not there"))
-    return findings
+    if findings:
+        raise ConfigError(findings)
 
 
 def _blocks(config: Config) -> Iterator[tuple[KeyPath, ParameterModel]]:

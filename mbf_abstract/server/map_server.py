@@ -14,8 +14,7 @@ from types import MappingProxyType
 from typing import Any
 
 from mbf_abstract.config.configuration import Config
-from mbf_abstract.config.findings import ConfigError
-from mbf_abstract.config.named_files import missing_files
+from mbf_abstract.config.named_files import refuse_missing_files
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import TransformError
@@ -50,10 +49,8 @@ class MapServer(AbstractNavigationServer):
 
     def load_map(self, config: Config) -> None:
         """Build the maps and begin to update them; ConfigError names all files that are missing."""
-        self.served = {}
-        self._contact_guard = ContactGuard()
-        if missing := missing_files(config):
-            raise ConfigError(missing)
+        self.served, self._contact_guard = {}, ContactGuard()
+        refuse_missing_files(config)
         for served in self.serve_maps(config):
             self.served[served.name] = served  # at once: what is there is closed if the next one fails
         self._scans = ScanIntake(self.runtime, self.served)
@@ -105,8 +102,7 @@ class MapServer(AbstractNavigationServer):
         expecting = [served for served in self.served.values() if topic in served.map.map_topics]
         if not expecting:
             super().take_floor(topic, floor)
-        refusals = [refusal for served in expecting if (refusal := served.refusal(topic, floor))]
-        if refusals:
+        if refusals := [refusal for served in expecting if (refusal := served.refusal(topic, floor))]:
             raise ValueError("; ".join(refusals))
 
     def missing_floor(self) -> str:
