@@ -86,7 +86,7 @@ class MovingObstaclesLayer(TrackingLayer, GridLayer):
         """Follow the objects through new scans; draw where they will be, note where they were."""
         for seen in self._objects.take_in(self.parameters, self._obstacle_points):
             box = box.union(self._note_trail(seen))
-        before, self._predicted = self._predicted, self._draw(now)
+        before, self._predicted = self._predicted, self._draw(now, robot_pose)
         return box.union(before).union(self._predicted)
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
@@ -116,11 +116,11 @@ class MovingObstaclesLayer(TrackingLayer, GridLayer):
         self._trail[here[:, 1], here[:, 0]] = False
         return _box_of(np.concatenate([left, here[before]]))
 
-    def _draw(self, now: float) -> CellBox:
+    def _draw(self, now: float, robot: Pose | None) -> CellBox:
         """Draw the predicted places instead of the last ones; return their box."""
         self.cells[self._predicted.slices] = self.default_value
         p, grid = self.parameters, self.geometry
-        predictions = self._objects.predictions(p, self._inscribed_radius, now, for_plans=self._for_plans)
+        predictions = self._objects.predictions(p, self._inscribed_radius, now, for_plans=self._for_plans, robot=robot)
         if not predictions:
             return EMPTY_BOX
         middles = np.concatenate([prediction.middles for prediction in predictions])

@@ -5,6 +5,9 @@ before any contact. Contacts that happen while it stands are not its fault. So a
 time, then the robot brakes (``braking.py``); objects keep their velocities until it stands, or turn now. A turn is
 noticed after ``turning_time``; until then the object may be wherever it gets at its pace, the greatest speed of late.
 While somebody who moves is nearer than the margin, or touches it, the robot stands.
+
+Who comes from behind, hardly faster than the robot drives away, follows it: to brake would bring about the contact that
+it is to avoid. So their velocity counts for the ``turning_time`` only, until which they notice what the robot does.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.maps.tracking.braking import Decelerations, motions_to_standstill
@@ -23,6 +26,10 @@ from mbf_abstract.parameters import ParameterModel, parameter
 
 SHARES = (1.0, 0.75, 0.5, 0.25)
 """Shares of a command that are tried, in this order, before the robot stops."""
+AWAY = 0.7
+"""A robot drives away from somebody where the cosine between its way and that from them to it is at least this."""
+FOLLOWING = 0.1
+"""Who follows is no faster [m/s] than the robot drives away, but for this: estimates of velocities are not exact."""
 CORNERS = 16
 """Of the outline of a round robot."""
 SAME_STOREY = 1.0
@@ -141,12 +148,45 @@ def safe_share(
     if not near or command.is_stopped(1e-9, 1e-9):
         return 1.0, None
     touched = None
+    apart = _gaps_now(box, pose, near) > limits.contact_margin
     for share in SHARES:
-        found = _first_contact(box, pose, velocity, command, share, near, limits)
+        left = apart & [is_left_behind(known, pose, velocity, command, share) for known in near]
+        found = _first_contact(box, pose, velocity, command, share, near, left, limits)
         if found is None:
             return share, touched
         touched = touched or found
     return 0.0, touched
+
+
+def _gaps_now(box: RobotBox, pose: Pose, objects: Sequence[TrackedObject]) -> FloatArray:
+    """Gaps (n,) [m] between the robot and objects."""
+    places = np.array([[(known.x, known.y) for known in objects]])
+    radii = np.array([known.radius for known in objects])
+    return np.asarray(box.gaps(np.array([(pose.x, pose.y, pose.yaw)]), places, radii)[0])
+
+
+def is_left_behind(known: TrackedObject, pose: Pose, velocity: Twist, command: Twist, share: float = 1.0) -> bool:
+    """Whether a robot that follows a share of a command drives away from an object, which is hardly faster.
+
+    Parameters
+    ----------
+    pose, velocity, command
+        As in ``safe_share``.
+    """
+    x, y = pose.x - known.x, pose.y - known.y
+    distance = math.hypot(x, y)
+    if distance == 0.0:
+        return False
+    asked, now = (_speed_along(twist, pose.yaw, x / distance, y / distance) for twist in (command, velocity))
+    if asked <= 0.0 or asked < AWAY * command.speed:
+        return False
+    return (known.vx * x + known.vy * y) / distance <= min(share * asked, now) + FOLLOWING
+
+
+def _speed_along(twist: Twist, yaw: float, x: float, y: float) -> float:
+    """Component [m/s] of a robot's motion at a heading [rad] along a unit vector."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return (c * twist.vx - s * twist.vy) * x + (s * twist.vx + c * twist.vy) * y
 
 
 def _first_contact(
@@ -156,17 +196,22 @@ def _first_contact(
     command: Twist,
     share: float,
     objects: Sequence[TrackedObject],
+    left: NDArray[np.bool_],
     limits: ContactParameters,
 ) -> TrackedObject | None:
-    """What the robot would touch before it stands, on the first of its motions on which it touches something."""
+    """What the robot would touch before it stands, on the first of its motions on which it touches something.
+
+    Those that are ``left`` (n,) behind keep their speeds for the turning time only, whichever way they go.
+    """
     middles = np.array([(known.x, known.y) for known in objects])
     velocities = np.array([(known.vx, known.vy) for known in objects])
-    paces = np.array([max(known.pace, known.speed) for known in objects])
-    radii = np.array([known.radius for known in objects]) + limits.contact_margin
+    speeds = np.array([known.speed for known in objects])
+    paces = np.where(left, speeds, np.maximum([known.pace for known in objects], speeds))
+    radii = np.array([known.radius for known in objects]) + np.where(left, 0.0, limits.contact_margin)
     braking = Decelerations(limits.decel_lim_x, limits.decel_lim_theta, limits.reaction_time)
     for times, poses in motions_to_standstill(pose, velocity, command, share, braking):
         places = middles[None] + times[:, None, None] * velocities[None]
-        contact = box.gaps(poses, places, radii) < 0.0
+        contact = (box.gaps(poses, places, radii) < 0.0) & ~left
         if limits.turning_time > 0.0:
             ways = np.minimum(times, limits.turning_time)[:, None] * paces
             contact |= box.gaps(poses, np.broadcast_to(middles, places.shape), radii + ways) < 0.0

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import field_validator
 
-from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.layers.layer import MapLayer
 from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
@@ -118,14 +118,21 @@ class MovingObstacles:
             return self._tracker.objects(now, guarded=True)
 
     def predictions(
-        self, parameters: MovingObstaclesParameters, inscribed_radius: float, now: float, *, for_plans: bool = True
+        self,
+        parameters: MovingObstaclesParameters,
+        inscribed_radius: float,
+        now: float,
+        *,
+        for_plans: bool = True,
+        robot: Pose | None = None,
     ) -> list[Prediction]:
         """Where the moving objects will be from ``now`` [s] on, for a robot of this radius [m].
 
-        With ``for_plans`` also for as long as it takes to pass them; a controller would only be slow in such costs.
+        With ``for_plans`` also for as long as it takes to pass them; a controller would only be slow in such costs. See
+        ``predict`` for the pose of the ``robot``.
         """
         sensor = self._sensor if for_plans else NOWHERE
-        found = (predict(known, parameters, inscribed_radius, sensor) for known in self.objects(now))
+        found = (predict(known, parameters, inscribed_radius, sensor, robot) for known in self.objects(now))
         return [prediction for prediction in found if len(prediction.costs)]
 
     def stale_reason(self, now: float, limit: float) -> str:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.maps.tracking.contact import ContactParameters
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.parameters import parameter
@@ -68,12 +68,17 @@ class Prediction(NamedTuple):
 
 
 def predict(
-    known: TrackedObject, parameters: PredictionParameters, inscribed_radius: float, sensor: FloatArray
+    known: TrackedObject,
+    parameters: PredictionParameters,
+    inscribed_radius: float,
+    sensor: FloatArray,
+    robot: Pose | None = None,
 ) -> Prediction:
     """Where an object will be, and what that costs a robot of this radius [m] with a ``sensor`` (3,) [m].
 
     The middles are at most an object's radius apart; there are none of an object that does not move. The costs fall
-    from ``prediction_cost`` at the first one towards 0 at the end of the time.
+    from ``prediction_cost`` at the first one towards 0 at the end of the time. Who comes from behind a ``robot`` whose
+    heading is known costs up to there: it would have to be slow in costs that are of somebody who follows it.
     """
     p = parameters
     time, radius = p.prediction_time, known.radius + inscribed_radius
@@ -86,7 +91,16 @@ def predict(
     middles = np.empty((steps, 3))
     middles[:, 0], middles[:, 1] = known.position_in(shares * time)
     middles[:, 2] = known.z
-    return Prediction(middles, radius, p.prediction_cost * (1.0 - shares))
+    costs = p.prediction_cost * (1.0 - shares)
+    if robot is not None and _is_behind(known, robot):
+        there = np.hypot(middles[:, 0] - robot.x, middles[:, 1] - robot.y) <= radius
+        end = int(np.argmax(there)) if there.any() else steps
+        middles, costs = middles[:end], costs[:end]
+    return Prediction(middles, radius, costs)
+
+
+def _is_behind(known: TrackedObject, robot: Pose) -> bool:
+    return (known.x - robot.x) * math.cos(robot.yaw) + (known.y - robot.y) * math.sin(robot.yaw) < 0.0
 
 
 def _kept_distance(known: TrackedObject, parameters: PredictionParameters) -> float:

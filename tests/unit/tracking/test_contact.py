@@ -63,6 +63,38 @@ def test_a_robot_that_is_caught_up_anyway_stands():
     assert share_of(Twist.planar(-0.6), moving(0.75, 0.0, -0.3)) == 1.0, "it gets away"
 
 
+def behind(gap, speed, aside=0.0):
+    """Somebody behind the disc, so far [m] away, who comes at a speed [m/s]."""
+    return moving(-0.55 - gap, aside, speed)
+
+
+@pytest.mark.parametrize(
+    ("gap", "speed", "share"), [(0.25, 0.6, 1.0), (0.25, 0.9, 0.0), (0.11, 0.9, 0.0), (0.05, 0.6, 0.0)]
+)
+def test_the_robot_brakes_for_nobody_who_follows_it_no_faster_than_it_goes(gap, speed, share):
+    """The last one is nearer than the margin."""
+    assert share_of(AHEAD, behind(gap, speed), limits=TURNING) == share
+
+
+def test_who_follows_too_near_to_notice_a_stop_is_let_by():
+    """In half a second this one comes 0.33 m, the robot gets away by 0.3 m."""
+    assert share_of(AHEAD, behind(0.03, 0.65), limits=TURNING.model_copy(update={"contact_margin": 0.0})) == 0.0
+
+
+def test_a_robot_that_sets_off_does_not_leave_anybody_behind_yet():
+    assert share_of(AHEAD, behind(0.3, 0.6), velocity=Twist(), limits=TURNING) == 0.0
+    assert share_of(AHEAD, behind(0.3, 0.05), velocity=Twist(), limits=TURNING) == 1.0
+
+
+def test_who_follows_does_not_hide_who_comes():
+    assert share_of(AHEAD, behind(0.25, 0.6), moving(1.2, 0.0, -0.8), limits=TURNING) == 0.0
+
+
+def test_a_robot_that_turns_off_or_backs_up_leaves_nobody_behind():
+    assert share_of(Twist.planar(-0.6), behind(0.25, 0.6), limits=TURNING) == 0.0
+    assert share_of(AHEAD, behind(0.25, 0.6), pose=Pose.planar(0.0, 0.0, 1.5), limits=TURNING) == 0.0
+
+
 def test_what_stands_is_the_business_of_the_obstacle_layers():
     for motion in (Motion.WAITING, Motion.PARKED):
         assert share_of(AHEAD, moving(0.8, 0.0, motion=motion)) == 1.0

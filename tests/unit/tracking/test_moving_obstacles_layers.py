@@ -79,6 +79,17 @@ def test_a_map_that_moves_with_the_robot_is_for_controllers_and_has_no_such_cost
     assert hall.cost(*near) > 0.0 == hall.cost(*far)
 
 
+def test_who_comes_from_behind_the_robot_costs_up_to_there(make_rolling_hall):
+    """Else a controller that is slow in costs would be so because somebody follows it."""
+    costs = {}
+    for where, (x, speed) in {"behind": (2.6, 0.8), "ahead": (7.4, -0.8)}.items():
+        hall = make_rolling_hall()
+        last, y = hall.watches(x, 1.0, speed, 0.0)
+        costs[where] = hall.cost(last + 0.5 * speed, y), hall.cost(5.0, 1.0)
+    assert costs["behind"][0] > 0.0 == costs["behind"][1]
+    assert costs["ahead"][0] > costs["ahead"][1] > 0.0
+
+
 def test_who_stands_has_no_predictions_and_stays_an_obstacle(hall):
     for _ in range(10):
         hall.sees((3.0, 4.0))
