@@ -20,7 +20,7 @@ def replacing(file: str | os.PathLike[str]) -> Iterator[Path]:
         yield part
         os.replace(part, file)
     except OSError as error:
-        if error.filename in (None, part, str(part)):  # None: the disk is full
+        if error.errno is not None and error.filename in (None, part, str(part)):  # None: the disk is full
             error.filename, error.filename2 = str(file), None
         raise
     finally:
