@@ -43,6 +43,19 @@ def test_a_plan_on_a_bare_map_is_reported_and_succeeds():
     assert "SUCCESS" in result.stdout and "length_m" in result.stdout
 
 
+def test_a_goal_where_the_outline_does_not_fit_is_refused_at_once(tmp_path):
+    """On a map that stays as it is the planner was asked again and again until its patience was over."""
+    config = tmp_path / "car.yaml"
+    assert mbf("config", "costmap_car", "--map", OFFICE, "--out", config).exit_code == 0
+    text, narrow = config.read_text(), "[[0.4, 0.15], [0.4, -0.15], [-0.1, -0.15], [-0.1, 0.15]]"
+    assert narrow in text
+    config.write_text(text.replace(narrow, "[[2.2, 0.7], [2.2, -0.7], [-0.8, -0.7], [-0.8, 0.7]]"))
+    result = mbf("plan", config, "--start", 3, 9.7, "--goal", 9, 9.7)
+
+    assert result.exit_code == 1
+    assert "BLOCKED_GOAL" in result.stdout and "does not fit at the goal (9.00, 9.70" in result.stdout
+
+
 @pytest.fixture(scope="module")
 def half_known(tmp_path_factory):
     """A picture of 10 m x 5 m whose middle nobody has seen."""
