@@ -120,7 +120,12 @@ class MovingObstaclesLayer(TrackingLayer, GridLayer):
         """Draw the predicted places instead of the last ones; return their box."""
         self.cells[self._predicted.slices] = self.default_value
         p, grid = self.parameters, self.geometry
-        predictions = self._objects.predictions(p, self._inscribed_radius, now, for_plans=self._for_plans, robot=robot)
+        driven_on = (
+            None if self._for_plans else robot
+        )  # plans lead past whoever is being passed, also from ahead of them
+        predictions = self._objects.predictions(
+            p, self._inscribed_radius, now, for_plans=self._for_plans, robot=driven_on
+        )
         if not predictions:
             return EMPTY_BOX
         middles = np.concatenate([prediction.middles for prediction in predictions])

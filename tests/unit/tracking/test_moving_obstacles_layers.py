@@ -90,6 +90,12 @@ def test_who_comes_from_behind_the_robot_costs_up_to_there(make_rolling_hall):
     assert costs["ahead"][0] > costs["ahead"][1] > 0.0
 
 
+def test_in_a_map_that_plans_are_made_on_who_comes_from_behind_costs_beyond_the_robot(hall):
+    """Else plans of a robot that passes somebody turn in close before them once it is ahead."""
+    hall.watches(2.6, 1.0, 0.8, 0.0)
+    assert hall.cost(5.0, 1.0) > 0.0
+
+
 def test_who_stands_has_no_predictions_and_stays_an_obstacle(hall):
     for _ in range(10):
         hall.sees((3.0, 4.0))
