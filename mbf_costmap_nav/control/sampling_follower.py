@@ -15,7 +15,8 @@ import numpy as np
 from mbf_abstract.geometry import FloatArray, Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.inertia import PLANNED, InertiaParameters, stopping_speed
-from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath, MotionLimits
+from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath
+from mbf_abstract.maps.controllers.motion_limits import MotionLimits
 from mbf_abstract.maps.controllers.room_to_turn import CREEPING
 from mbf_abstract.maps.controllers.standing import StandingParameters
 from mbf_abstract.maps.controllers.tight_places import cannot_turn_ahead

@@ -19,7 +19,7 @@ from mbf_abstract.geometry import Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.failures import no_motion
 from mbf_abstract.maps.controllers.inertia import reached
-from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
+from mbf_abstract.maps.controllers.motion_limits import MotionLimits
 from mbf_abstract.maps.tracking.avoidance import MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -88,7 +88,7 @@ class DWAController(SamplingFollower):
     def limits(self, cycle: ControlCycle) -> MotionLimits:
         """Those of the window."""
         p, top = self.parameters, cycle.speed_limit
-        gains = p.acc_lim_x * self._period, p.acc_lim_theta * self._period
+        gains = (self._period * self._braking).tolist()
         return MotionLimits(max(p.min_vel_x, -top), min(p.max_vel_x, top), p.max_vel_theta, False, *gains)
 
     @property
@@ -147,7 +147,7 @@ class DWAController(SamplingFollower):
         p, now = self.parameters, cycle.request.velocity
         velocities = np.repeat(candidates.T.astype(np.float32)[:, None, :], steps, axis=1)
         change = np.array([p.acc_lim_x, p.acc_lim_y, p.acc_lim_theta], dtype=np.float32) * np.float32(p.sim_step)
-        limit = np.full(3, np.inf, dtype=np.float32)
+        limit = np.array([np.inf, np.inf if p.max_vel_y > 0.0 else 0.0, np.inf], dtype=np.float32)
         measured = np.array([now.vx, now.vy, now.wz], dtype=np.float32)
         clip_velocities(velocities, measured, -limit, limit, change, 0.0, np.inf)
         return velocities

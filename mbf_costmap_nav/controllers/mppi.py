@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Twist
 from mbf_abstract.maps.controllers.failures import no_motion
-from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
+from mbf_abstract.maps.controllers.motion_limits import MotionLimits
 from mbf_abstract.maps.tracking.avoidance import MovingAround
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -127,7 +127,7 @@ class MPPIController(SamplingFollower):
     def limits(self, cycle: ControlCycle) -> MotionLimits:
         """Those of the samples."""
         p, top = self.parameters, cycle.speed_limit
-        gains = p.acc_lim_x * p.model_dt, p.acc_lim_theta * p.model_dt
+        gains = p.acc_lim_x * p.model_dt, p.acc_lim_y * p.model_dt, p.acc_lim_theta * p.model_dt
         return MotionLimits(max(p.min_vel_x, -top), min(p.max_vel_x, top), p.max_vel_theta, self._radius > 0.0, *gains)
 
     def set_plan(self, path: Path) -> bool:

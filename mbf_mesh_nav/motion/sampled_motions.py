@@ -11,7 +11,7 @@ import numpy as np
 from mbf_abstract.geometry import AckermannCommand, Command, Twist
 from mbf_abstract.geometry.arithmetic import tan
 from mbf_abstract.maps.controllers.inertia import InertiaParameters
-from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
+from mbf_abstract.maps.controllers.motion_limits import MotionLimits
 from mbf_abstract.maps.controllers.standing import StandingParameters
 from mbf_abstract.maps.tracking.avoidance import AvoidanceParameters
 from mbf_abstract.parameters import parameter
@@ -97,7 +97,9 @@ class SampledMotions:
         """What may be commanded; who may drive on ground that the map forbids does not leave it."""
         p = self.parameters
         is_car, leaves_contacts = p.motion_model == "ackermann", p.cost_limit <= FORBIDDEN_COST
-        return MotionLimits(p.min_vel_x, p.max_vel_x, p.max_vel_theta, is_car, leaves_contacts=leaves_contacts)
+        gain, turn_gain = p.acc_lim_x * p.control_period, p.acc_lim_theta * p.control_period
+        speeds, gains = (p.min_vel_x, p.max_vel_x, p.max_vel_theta), (gain, gain, turn_gain)
+        return MotionLimits(*speeds, is_car, *gains, leaves_contacts=leaves_contacts)
 
     @property
     def turning_radius(self) -> float:

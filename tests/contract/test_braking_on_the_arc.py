@@ -26,6 +26,7 @@ STEERING = {"costmap": ["regulated_pure_pursuit", "follow_path"], "mesh": ["path
 SAMPLING = {"costmap": ["dwa", "mppi"], "mesh": ["mppi"]}
 RADIUS = 1.5
 START = Pose.planar(3.0, 1.5)
+TOLERANCES = 0.45, 0.1
 SLACK = 1e-6
 
 
@@ -40,9 +41,20 @@ def half_circle():
     return Path.from_points(np.column_stack([x, y, np.zeros(60)]), frame_id="map")
 
 
-def drive(world, name, seconds=8.0):
+def wall_beyond_its_end(x, y):
+    """So near beyond the end of a straight path that no robot comes to it."""
+    return (np.abs(x - 5.2) < 0.1) & (np.abs(y - 1.5) < 1.0)
+
+
+def straight_on_and_turn():
+    x = np.linspace(3.0, 5.0, 40)
+    points = np.column_stack([x, np.full(40, 1.5), np.zeros(40)])
+    return Path.from_points(points, Pose.planar(0.0, 0.0, 2.0).orientation, frame_id="map")
+
+
+def drive(world, name, seconds=8.0, path=half_circle, blocked=wall):
     """Measured velocities and results of a robot that does as it is commanded, until it is refused at rest."""
-    plugin, navigation_map = PluginRegistry(world.backend).load(PluginKind.CONTROLLER, name), world.map_of(wall)
+    plugin, navigation_map = PluginRegistry(world.backend).load(PluginKind.CONTROLLER, name), world.map_of(blocked)
     fields = plugin.Parameters.model_fields
     stated = {key: value for key, value in STATED.items() if key in fields}
     stated |= {"model_dt": PERIOD} if world.backend == "costmap" and name == "mppi" else {}
@@ -52,8 +64,10 @@ def drive(world, name, seconds=8.0):
 
     pose, velocity, rows = START, Twist(), []
     with rig(plugin, make_context, plugin.Parameters(**stated), START) as made:
-        assert made.plugin.set_plan(half_circle())
+        assert made.plugin.set_plan(path())
         for _ in range(round(seconds / PERIOD)):
+            if made.plugin.is_goal_reached(pose, *TOLERANCES):
+                break
             result = made.plugin.compute_velocity_commands(ControlRequest(pose, velocity))
             rows.append((velocity, result))
             if not result.success:
@@ -85,3 +99,14 @@ def test_no_command_is_farther_from_the_last_one_than_a_period_allows(world):
             if result.success:
                 assert abs(result.command.vx - velocity.vx) <= ACCELERATION * PERIOD + SLACK, name
                 assert abs(result.command.wz - velocity.wz) <= YAW_ACCELERATION * PERIOD + SLACK, name
+
+
+def test_nor_where_the_path_leads_no_nearer_to_the_goal_and_only_a_turn_is_left(world):
+    for name in STEERING[world.backend] + SAMPLING[world.backend]:
+        rows = drive(world, name, 12.0, straight_on_and_turn, wall_beyond_its_end)
+        commands = [(velocity, result.command) for velocity, result in rows if result.success]
+        for velocity, command in commands:
+            assert abs(command.vx - velocity.vx) <= ACCELERATION * PERIOD + SLACK, name
+            assert abs(command.wz - velocity.wz) <= YAW_ACCELERATION * PERIOD + SLACK, name
+        if name == "follow_path":
+            assert max(command.wz for _, command in commands) > 0.5, "it turns to the goal's heading"

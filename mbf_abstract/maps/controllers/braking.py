@@ -1,4 +1,4 @@
-"""Braking along the arc on which a robot rolls, once no motion is free any more.
+"""Braking along the arc on which a robot rolls, once no motion is free any more; and no command beyond what it can do.
 
 When to use: in every controller that looks along the arc of a command until the robot has stopped on it. A robot that
 is only sent zero slows down its speed and its turn each as fast as it can: it leaves that arc for ground that nobody
@@ -11,6 +11,7 @@ until the next one. What cannot be slowed down so fast, the speed or the turn, d
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import replace
 from functools import cached_property
 
 from mbf_abstract.geometry import Command, Twist
@@ -58,9 +59,11 @@ class BrakesOnItsArc(AbstractController):
         """The motion of this cycle, found free until the robot has stopped on its arc, or a refusal."""
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
-        """Give the free motion, or brake along the last one."""
+        """Give the free motion, as far as the robot can do it until the next cycle, or brake along the last one."""
         result = self.free_motion(request)
         if not result.success:
             return self.last_arc.answer(result, request.velocity, self.inertia)
+        if isinstance(result.command, Twist):
+            result = replace(result, command=self.inertia.reached(result.command, request.velocity))
         self.last_arc.keep(result.command)
         return result

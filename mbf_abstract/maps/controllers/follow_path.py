@@ -202,7 +202,7 @@ class FollowPath(LeavesContacts, SteeringToPath, BrakesOnItsArc):
         A robot that cannot come nearer to its goal, but stands within its tolerance, only turns to its heading.
         """
         if tracker.has_arrived(self._dist_tolerance) and self._ends_here(pose, tracker):
-            return [self._turn(self._from_goal(pose, tracker)[1])]
+            return [self._reachable(self._turn(self._from_goal(pose, tracker)[1]))]
         backward, fits = self._backward(tracker), outline_fits(self, pose, AS_CONFIGURED)
         if not all(fits(*one) for one in poses_ahead(tracker, reach, backward).tolist()):
             return []

@@ -23,6 +23,8 @@ PLANNED = 0.7
 """Share of its braking that is planned with: a robot that cuts its path comes to the end sooner than by its length."""
 ROUNDING = 1e-9
 """With less than this share of its speed a robot stands."""
+SINGLE = 1e-6
+"""A change larger than allowed by less than this share of it is rounding, also of samples in single precision."""
 LOOKS = 4.0
 """So often a robot is asked at least while it drives as far as it looks ahead."""
 
@@ -106,11 +108,17 @@ def within(wanted: float, now: float, change: float) -> float:
 
 
 def reached(command: Twist, measured: Twist, changes: tuple[float, float, float]) -> Twist:
-    """What comes of a command where vx, vy [m/s] and the yaw rate [rad/s] change by so much, vx and vy together."""
-    ahead, left = command.vx - measured.vx, command.vy - measured.vy
-    share = 1.0 / max(math.hypot(ahead / changes[0], left / changes[1]), 1.0)
-    vx, vy = measured.vx + share * ahead, measured.vy + share * left
-    return Twist.planar(vx, vy, within(command.wz, measured.wz, changes[2]))
+    """What comes of a command where vx, vy [m/s] and the yaw rate [rad/s] change by so much, vx and vy together.
+
+    What can be reached is returned as it is, bit for bit.
+    """
+    ahead, left, turn = command.vx - measured.vx, command.vy - measured.vy, command.wz
+    parts, vx, vy = math.hypot(ahead / changes[0], left / changes[1]), command.vx, command.vy
+    if parts > 1.0 + SINGLE:
+        vx, vy = measured.vx + ahead / parts, measured.vy + left / parts
+    if abs(turn - measured.wz) > (1.0 + SINGLE) * changes[2]:
+        turn = within(turn, measured.wz, changes[2])
+    return Twist.planar(vx, vy, turn)
 
 
 def stopping_speed(distance: float, deceleration: float, reaction_time: float = 0.0) -> float:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ from mbf_abstract.maps.controllers.failures import stands
 from mbf_abstract.maps.controllers.follow_path import FollowPath
 from mbf_abstract.maps.controllers.follow_path_parameters import FollowPathParameters
 from mbf_abstract.maps.controllers.inertia import InertiaParameters
+from mbf_abstract.maps.controllers.motion_limits import MotionLimits
 from mbf_abstract.maps.controllers.room_to_turn import CREEPING
 from mbf_abstract.maps.controllers.standing import Standing, StandingParameters
 from mbf_abstract.maps.map_plugin import MapContext
@@ -43,41 +44,6 @@ FARTHEST = 100.0
 """However far [m] from its path the robot is, that is for the controller to judge."""
 LOOK, LOOK_STEP = 1.5, 0.1
 """Time [s] over which motions along the path are compared with what moves, and between two looks."""
-
-
-@dataclass(frozen=True)
-class MotionLimits:
-    """What a controller may command in one cycle.
-
-    Attributes
-    ----------
-    slowest, fastest : float
-        Least and largest speed [m/s]; negative = backward.
-    turning : float
-        Largest yaw rate [rad/s].
-    is_car : bool
-        Whether the robot cannot turn on the spot.
-    gain, turn_gain : float
-        By how much [m/s, rad/s] a speed or yaw rate may exceed the measured one.
-    leaves_contacts : bool
-        False = the controller may drive on ground that the map forbids: what the map calls a contact is none for it.
-    """
-
-    slowest: float
-    fastest: float
-    turning: float
-    is_car: bool = False
-    gain: float = math.inf
-    turn_gain: float = math.inf
-    leaves_contacts: bool = True
-
-    def hold(self, command: Twist, measured: Twist) -> Twist:
-        """The same arc within the limits."""
-        speed, turn = abs(command.vx), abs(command.wz)
-        fastest = min(self.fastest if command.vx >= 0.0 else -self.slowest, abs(measured.vx) + self.gain)
-        turning = min(self.turning, abs(measured.wz) + self.turn_gain)
-        share = min(fastest / speed if speed > fastest else 1.0, turning / turn if turn > turning else 1.0)
-        return Twist.planar(share * command.vx, 0.0, share * command.wz)
 
 
 class KeepingToPath:
@@ -181,7 +147,7 @@ class KeepingToPath:
         stood = self._standing.time(now, limits.fastest, limits.turning)
         if (out := self.out_of_contact(request, limits)) is not None:
             self._standing.commanded(out.command)
-            return self._or_brake(out, request.velocity)
+            return self._or_brake(out, request.velocity, limits)
         along, reason = None, ""
         drives = not limits.is_car or (self.car is not None and self._follower.remaining > AT_END)
         keeps = drives and (
@@ -203,14 +169,14 @@ class KeepingToPath:
         if result.hindered_by or not result.success:
             self._standing.restart(now)
         self._standing.commanded(result.command)
-        return self._or_brake(result, request.velocity)
+        return self._or_brake(result, request.velocity, limits)
 
-    def _or_brake(self, result: ControlResult, measured: Twist) -> ControlResult:
+    def _or_brake(self, result: ControlResult, measured: Twist, limits: MotionLimits) -> ControlResult:
         """An answer as far as the robot can do it until the next, or braking along its arc instead of a refusal."""
         if not result.success:
             return self._last_arc.answer(result, measured, self._brakes_by)
         if isinstance(result.command, Twist):
-            result = replace(result, command=self._brakes_by.reached(result.command, measured))
+            result = replace(result, command=limits.reached(result.command, measured))
         self._last_arc.keep(result.command)
         return result
 

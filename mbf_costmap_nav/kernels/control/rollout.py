@@ -17,15 +17,28 @@ Float32Array = NDArray[np.float32]
 
 
 @plain_kernel
-def _slow_down(velocities: Float32Array, top_speed: np.float32) -> None:
-    """Shorten (vx, vy) of velocities (3, steps, samples) to ``top_speed`` [m/s] where they are longer."""
+def _clip_together(
+    velocities: Float32Array,
+    now: Float32Array,
+    low: Float32Array,
+    high: Float32Array,
+    change: Float32Array,
+    top_speed: np.float32,
+) -> None:
+    """Limit (vx, vy) of velocities (3, steps, samples) as vectors: range and ``top_speed`` [m/s], then the change."""
+    one = np.float32(1.0)
     for t in range(velocities.shape[1]):
         forward, left = velocities[0, t], velocities[1, t]
         for n in range(velocities.shape[2]):
-            speed = np.sqrt(forward[n] * forward[n] + left[n] * left[n])
-            if speed > top_speed:
-                forward[n] *= top_speed / speed
-                left[n] *= top_speed / speed
+            vx, vy = min(max(forward[n], low[0]), high[0]), min(max(left[n], low[1]), high[1])
+            speed = np.sqrt(vx * vx + vy * vy)
+            share = top_speed / speed if speed > top_speed else one
+            last_vx = velocities[0, t - 1, n] if t > 0 else now[0]
+            last_vy = velocities[1, t - 1, n] if t > 0 else now[1]
+            ahead, aside = share * vx - last_vx, share * vy - last_vy
+            gain, side_gain = ahead / change[0], aside / change[1]
+            parts = max(np.sqrt(gain * gain + side_gain * side_gain), one)
+            forward[n], left[n] = last_vx + ahead / parts, last_vy + aside / parts
 
 
 @kernel
@@ -40,6 +53,9 @@ def clip_velocities(
 ) -> None:
     """Limit velocities (3, steps, samples: vx, vy, wz) in place: range, change per step, turning radius, speed.
 
+    A robot that can go sideways accelerates along its velocity: ``change`` holds for (vx, vy) together, as the half
+    axes of an ellipse.
+
     Parameters
     ----------
     now : (3,) float32
@@ -50,11 +66,15 @@ def clip_velocities(
         abs(wz) is at most abs(vx) / radius [m]; 0 = can turn in place.
     top_speed : float
         Limit [m/s] of the length of (vx, vy), which keeps its direction; looked at where the robot can go sideways.
-        The change per step then holds for its length, not for each component.
     """
     _, steps, samples = velocities.shape
     per_radius = np.float32(1.0 / min_turning_radius) if min_turning_radius > 0.0 else np.float32(0.0)
+    goes_sideways = low[1] != high[1]
+    if goes_sideways:
+        _clip_together(velocities, now, low, high, change, np.float32(top_speed))
     for component in range(3):
+        if goes_sideways and component < 2:
+            continue
         lowest, highest, delta = low[component], high[component], change[component]
         if lowest == highest:  # a direction this robot does not have
             velocities[component] = lowest
@@ -71,8 +91,6 @@ def clip_velocities(
                 value = lowest if value < lowest else value
                 row[n] = value
                 last[n] = value
-    if low[1] != high[1]:
-        _slow_down(velocities, np.float32(top_speed))
     if per_radius > 0.0:
         for t in range(steps):
             forward, turn = velocities[0, t], velocities[2, t]

@@ -5,7 +5,7 @@ import pytest
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import AckermannCommand, Path, Twist
-from mbf_abstract.maps.controllers.keeping_to_path import MotionLimits
+from mbf_abstract.maps.controllers.motion_limits import MotionLimits
 from mbf_abstract.maps.controllers.standing import FORGOTTEN, Standing
 from mbf_abstract.maps.controllers.tight_places import cannot_turn_ahead
 

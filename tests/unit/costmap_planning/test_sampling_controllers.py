@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.controllers.inertia import reached
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
@@ -79,12 +80,28 @@ def test_clipped_velocities_keep_all_limits(seed, radius, top_speed):
     clip_velocities(velocities, *(a.astype(np.float32) for a in (now, low, high, change)), radius, top_speed)
     steps = np.diff(np.concatenate([np.zeros((3, 1, 7)), velocities], axis=1), axis=1)
     assert (velocities >= low[:, None, None] - 1e-6).all() and (velocities <= high[:, None, None] + 1e-6).all()
-    if top_speed == math.inf:
-        assert (abs(steps[:2]) <= change[:2, None, None] + 1e-6).all()
-    assert np.hypot(steps[0], steps[1]).max() <= np.hypot(*change[:2]) + 1e-6
+    assert np.hypot(*(steps[:2] / change[:2, None, None])).max() <= 1.0 + 1e-5
+    assert abs(steps[2]).max() <= change[2] + 1e-6 or radius
     assert np.hypot(velocities[0], velocities[1]).max() <= top_speed + 1e-6
     if radius:
         assert (abs(velocities[2]) * radius <= abs(velocities[0]) + 1e-6).all()
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds, top_speed=st.sampled_from([0.4, math.inf]))
+def test_what_both_directions_change_together_equals_a_step_by_step_limit(seed, top_speed):
+    velocities, now = random_velocities(seed), np.array([0.2, -0.1, 0.0], dtype=np.float32)
+    high, change = np.array([0.5, 0.3, 1.0], dtype=np.float32), np.array([0.1, 0.05, 9.0], dtype=np.float32)
+    expected = np.empty((2, 12, 7))
+    for n in range(7):
+        last = Twist.planar(*now.tolist())
+        for t in range(12):
+            vx, vy = (max(-h, min(float(velocities[k, t, n]), h)) for k, h in enumerate(high[:2].tolist()))
+            share = min(1.0, top_speed / math.hypot(vx, vy))
+            last = reached(Twist.planar(share * vx, share * vy), last, tuple(change.tolist()))
+            expected[:, t, n] = last.vx, last.vy
+    clip_velocities(velocities, now, -high, high, change, 0.0, top_speed)
+    np.testing.assert_allclose(velocities[:2], expected, atol=1e-5)
 
 
 @settings(max_examples=20, deadline=None)
@@ -321,6 +338,28 @@ def test_an_omnidirectional_robot_drives_a_bend_without_turning(make_plugin, clo
     )
     assert outcome == 0
     assert max(abs(state[2]) for state in robot.trace) < 0.4
+
+
+@pytest.mark.parametrize("gap", [12, 9], ids=["wide", "it keeps to its path"])
+def test_both_directions_of_an_omnidirectional_robot_change_together(make_plugin, gap):
+    cells = np.zeros((200, 200), dtype=np.uint8)
+    cells[:, 112:114] = 254
+    cells[96 : 96 + gap, 112:114] = 0
+    model = {
+        "motion_model": "omni",
+        "batch_size": 500,
+        "acc_lim_x": 2.0,
+        "acc_lim_y": 1.0,
+        "vx_std": 0.6,
+        "vy_std": 0.6,
+    }
+    controller = make_plugin(MPPIController, Costmap(cells, 0.05, -5.0, -5.0), **model)
+    controller.set_plan(Path.from_points([(x, 0.02, 0.0) for x in np.linspace(0.0, 2.0, 21)]))
+    for measured in (Twist.planar(0.2, 0.4), Twist.planar(0.0, -0.3, 0.5), Twist.planar(0.5)):
+        command = controller.compute_velocity_commands(ControlRequest(Pose.planar(0.0, 0.02), measured)).command
+        gains = (command.vx - measured.vx) / (2.0 * 0.05), (command.vy - measured.vy) / (1.0 * 0.05)
+        assert math.hypot(*gains) <= 1.0 + 1e-5
+        assert controller._keeping.is_keeping == (gap == 9)
 
 
 def test_a_differential_robot_never_moves_sideways(make_plugin):
