@@ -21,9 +21,9 @@ import numpy as np
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm, rotated_back
 from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.maps.manoeuvres import PlanarPose, Step, find_manoeuvre
+from mbf_abstract.maps.manoeuvres import CHECKED_EVERY, PlanarPose, Step, find_manoeuvre
 from mbf_abstract.maps.navigation_map import NavigationMap
-from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_abstract.maps.queries import PADDED, CellState, PlaceQuery
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.traffic.right_of_way import STOREY
 
@@ -31,6 +31,7 @@ PATH_SPACING = 0.1  # m
 ROOM = 0.05  # m
 AT_EASE, SHORT = 0.1, 0.05  # m
 LEAVING = 0.3  # m around a robot that touches something, or nearly does
+BETWEEN = 0.5 * CHECKED_EVERY  # m before and behind a pose at the edge of free ground
 NEAREST_WITHIN = 2.0  # m
 MEETING = 3.0  # m; who is farther away is not whom the robot makes room for
 
@@ -65,7 +66,7 @@ def find_pull_out(
         None if there is no such place, or it was canceled.
     """
     for room, farther in ((ROOM, AT_EASE), (0.0, SHORT)):
-        is_free = _freedom(navigation_map, start, room)
+        is_free = _Freedom(navigation_map, start, room).is_free
 
         def left(pose: PlanarPose, wanted: float = distance + farther) -> float:
             return max(wanted - float(norm(keep_free - np.array(pose[:2])).min()), 0.0)
@@ -76,29 +77,54 @@ def find_pull_out(
     return None
 
 
-def _freedom(navigation_map: NavigationMap, start: Pose, room: float) -> Callable[[PlanarPose], bool]:
-    """Return whether the robot, with room [m] around it, may stand at a pose in its own plane.
+class _Freedom:
+    """Where the robot, with ``room`` [m] around it, may stand in its own plane at ``start``.
 
     Where it touches something it is let out, to where it is no nearer to what it touches. Where something is only
     within the room, it is let out through poses at which it touches nothing: the distance of its base from a wall does
-    not say whether its outline fits with another heading.
+    not say whether its outline fits with another heading. Ground on which ``obstacle_on_path`` stops it is no way, so
+    that what is found can be driven; a robot that stands on such ground is let out over what costs no more.
     """
-    frame = Transform(start.position, start.orientation, start.frame_id, "begin")
-    with_room = navigation_map.pose_check(PlaceQuery(use_padded_footprint=True, safety_dist=room))
-    outline = navigation_map.pose_check(PlaceQuery(use_padded_footprint=True))
-    is_near = with_room(start).state > CellState.INSCRIBED
-    least_gap = _gap(navigation_map, start) if is_near else math.inf
 
-    def is_free(pose: PlanarPose) -> bool:
-        x, y, yaw = pose
-        there = frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id="begin"))
-        if with_room(there).state <= CellState.INSCRIBED:
-            return True
-        if not is_near or math.hypot(x, y) > LEAVING or _gap(navigation_map, there) < least_gap:
+    def __init__(self, navigation_map: NavigationMap, start: Pose, room: float) -> None:
+        self._map, self._room = navigation_map, room
+        self._frame = Transform(start.position, start.orientation, start.frame_id, "begin")
+        roomy = PlaceQuery(use_padded_footprint=True, safety_dist=room)
+        self._with_room, self._outline = navigation_map.pose_check(roomy), navigation_map.pose_check(PADDED)
+        self._roomy_way, self._way = navigation_map.path_check(roomy), navigation_map.path_check(PADDED)
+        self._stands_on = self._roomy_way(start)
+        self._plans_by_outline = type(navigation_map).path_check is NavigationMap.path_check
+        self._is_near = self._with_room(start).state > CellState.INSCRIBED
+        self._least_gap = _gap(navigation_map, start) if self._is_near else math.inf
+
+    def is_free(self, pose: PlanarPose) -> bool:
+        """Whether it may stand at a pose."""
+        there = self._at(pose)
+        if self._with_room(there).state <= CellState.INSCRIBED:
+            return self._is_way(pose, there)
+        if not self._is_near or math.hypot(*pose[:2]) > LEAVING or _gap(self._map, there) < self._least_gap:
             return False
-        return room == 0.0 or outline(there).state <= CellState.INSCRIBED
+        fits = self._outline(there).state <= CellState.INSCRIBED
+        return self._room == 0.0 or (fits and self._is_way(pose, there))
 
-    return is_free
+    def _is_way(self, pose: PlanarPose, there: Pose) -> bool:
+        """Whether it may drive here; as it leaves ground without room, also if only nothing stops it."""
+        if self._plans_by_outline:  # which touches nothing
+            return True
+        ground, (x, y, yaw) = self._roomy_way(there), pose
+        if ground.state <= CellState.INSCRIBED:
+            return True
+        if self._stands_on.state <= CellState.INSCRIBED or math.hypot(x, y) > LEAVING:
+            return False
+        if self._room == 0.0:
+            return ground.cost <= self._stands_on.cost
+        ahead, left = BETWEEN * math.cos(yaw), BETWEEN * math.sin(yaw)
+        around = (there, self._at((x + ahead, y + left, yaw)), self._at((x - ahead, y - left, yaw)))
+        return all(self._way(one).state <= CellState.INSCRIBED for one in around)
+
+    def _at(self, pose: PlanarPose) -> Pose:
+        x, y, yaw = pose
+        return self._frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id="begin"))
 
 
 def _gap(navigation_map: NavigationMap, pose: Pose) -> float:

@@ -177,12 +177,9 @@ class PathFollower(LeavesContacts, BrakesOnItsArc, SurfaceFollower):
         return self._command(speed, speed * curvature)
 
     def _is_free(self, pose: Pose, target: FloatArray, bearing: float, curvature: float) -> bool:
-        """Whether the map allows all of the arc to a target, which cuts the corners of the path.
-
-        It is asked for robots that state their inertia; others drive as before, bit for bit.
-        """
+        """Whether the map allows all of the arc to a target, which cuts the corners of the path."""
         p = self.parameters
-        if p.check_ahead_dist == 0.0 or p.acc_lim_x == math.inf:
+        if p.check_ahead_dist == 0.0:
             return True
         length = float(norm(target - np.asarray(pose.position)))
         length *= bearing / math.sin(bearing) if bearing != 0.0 else 1.0

@@ -84,18 +84,22 @@ class MeshPlaces:
         state = CellState.INSCRIBED if self._blocked(around).any() else CellState.FREE
         return PlaceAnswer(state, float(costs.sum()))
 
-    def check_on_path(self, pose: Pose) -> PlaceAnswer:
+    def check_on_path(self, pose: Pose, room: float = 0.0) -> PlaceAnswer:
         """State and cost of the vertex nearest to a robot's centre: LETHAL if no plan would touch it.
 
-        Ground is free where the nearest corner of its face is, see ``kernels.search.forbidden_surface``.
+        Ground is free where the nearest corner of its face is, see ``kernels.search.forbidden_surface``. With ``room``
+        [m] all corners of the face count, and all vertices within it: small errors keep the robot on free ground.
         """
         place = self._on_surface(pose)
         if place is None:
             return OUTSIDE
-        vertex = self._nearest_vertex(place)
-        cost = float(self.snapshot.costs[vertex])
-        is_free = cost < FORBIDDEN_COST and not self.snapshot.lethal[vertex]
-        return PlaceAnswer(CellState.FREE if is_free else CellState.LETHAL, cost)
+        vertices = np.array([self._nearest_vertex(place)])
+        if room > 0.0:
+            corners = self.topology.faces[place.face][place.barycentric > ON_EDGE]
+            vertices = np.concatenate([corners, self._disc(place, room)])
+        costs, lethal = self.snapshot.costs[vertices], self.snapshot.lethal[vertices]
+        is_free = bool(np.all((costs < FORBIDDEN_COST) & ~lethal))
+        return PlaceAnswer(CellState.FREE if is_free else CellState.LETHAL, float(costs.max()))
 
     def find_valid_pose(self, pose: Pose, dist_tolerance: float, query: PlaceQuery) -> PoseAnswer:
         """Nearest pose within ``dist_tolerance`` [m] where the disc fits: the pose itself, else a vertex near it.

@@ -137,7 +137,8 @@ class SnapshotAnswers(OutlinedMap):
 
     def path_check(self, query: PlaceQuery) -> PlaceCheck:
         """State of the ground below the robot's centre as planners look at it: LETHAL where it costs too much."""
-        return self.places().check_on_path
+        places = self.places()
+        return lambda pose: places.check_on_path(pose, query.safety_dist)
 
     def find_valid_pose(
         self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery

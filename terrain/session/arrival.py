@@ -12,7 +12,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from mbf_abstract.config.navigation_parameters import NavigationParameters
-from mbf_abstract.geometry import Pose, normalize_angle
+from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.tangent_plane import heading_error
 from mbf_abstract.goals.result_types import MoveBaseResult
 from terrain.scenarios.limits import Limits
 from terrain.scenarios.noise import LocalizationNoise
@@ -27,7 +28,7 @@ class Arrival:
     Attributes
     ----------
     distance_m, angle_deg : float
-        From the goal in truth; the angle is that between the headings.
+        From the goal in truth; the angle is what the robot would have to turn, on a slope as its controller sees it.
     estimated_distance_m, estimated_angle_deg : float
         The same by the pose that the localisation estimated.
     """
@@ -40,11 +41,12 @@ class Arrival:
     @classmethod
     def at(cls, goal: Pose, truth: Pose, result: MoveBaseResult) -> Arrival:
         """Compare the true pose and the one in navigation's result with the goal."""
+        estimate = result.final_pose
         return cls(
             truth.distance_to(goal),
-            abs(math.degrees(normalize_angle(truth.yaw - goal.yaw))),
+            abs(math.degrees(heading_error(truth, goal))),
             result.dist_to_goal,
-            math.degrees(result.angle_to_goal),
+            math.inf if estimate is None else abs(math.degrees(heading_error(estimate, goal))),
         )
 
     def to_json(self) -> dict[str, Any]:

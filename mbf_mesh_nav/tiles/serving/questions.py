@@ -109,11 +109,11 @@ class TileQuestions(OutlinedMap):
 
     def path_check(self, query: PlaceQuery) -> PlaceCheck:
         """State of the ground below the robot's centre as planners look at it: LETHAL where it costs too much."""
-        now = self.moment()
+        now, room = self.moment(), query.safety_dist
 
         def check(pose: Pose) -> PlaceAnswer:
-            there = now.places(pose.x, pose.y, OF_PLACES)
-            return OUTSIDE if there is None else there.check_on_path(pose)
+            there = now.places(pose.x, pose.y, OF_PLACES + room)
+            return OUTSIDE if there is None else there.check_on_path(pose, room)
 
         return check
 

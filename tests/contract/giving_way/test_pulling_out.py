@@ -7,7 +7,7 @@ import pytest
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.pull_out import find_pull_out, paths_to_keep_free
-from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_abstract.maps.queries import PADDED, CellState, PlaceQuery
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_costmap_nav.grid.costmap import Costmap
@@ -182,7 +182,7 @@ def test_a_robot_that_touches_what_stands_before_it_is_let_out(give_way):
     closed = bay(2.4, 3.4, True)
     result, motion = give_way(lambda x, y: closed(x, y) | (x > 4.65))
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
-    assert motion.end.y > 3.7
+    assert motion.end.y > 3.6
 
 
 def test_it_follows_a_path_that_is_not_along_x(give_way):
@@ -256,3 +256,14 @@ def test_a_drive_that_somebody_stops_goes_on_once_they_are_gone(give_way, world)
     assert stops
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
     assert abs(motion.end.y - 3.0) > 0.5
+
+
+@pytest.mark.parametrize("aside", [0.03, 0.06, 0.09, 0.12])
+def test_a_robot_at_the_edge_of_free_ground_finds_a_manoeuvre_that_it_may_drive(give_way, world, aside):
+    """Beside the walls the ground of a mesh costs too much to be driven onto before the disc touches anything."""
+    navigation_map = world.inflated(bay(2.4, 3.4, True))
+    for start in (Pose.planar(4.5 + 0.03 * k, 3.0 - aside, 0.02 * k) for k in range(5)):
+        if navigation_map.path_check(PADDED)(start).state <= CellState.INSCRIBED:
+            result, motion = give_way(bay(2.4, 3.4, True), start, navigation_map=navigation_map)
+            assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+            assert motion.end.y > 3.6

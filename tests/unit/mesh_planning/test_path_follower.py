@@ -1,11 +1,13 @@
 """Pure pursuit on the surface: the law cycle by cycle, and closed loops on hills with a robot that turns too slowly."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.maps.relaxation import Slack
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
@@ -16,6 +18,13 @@ from mbf_mesh_nav.planners.astar import AStarPlanner
 
 def line(x_from, x_to, y=3.0, count=30):
     return Path.from_points([(x, y, 0.0) for x in np.linspace(x_from, x_to, count)])
+
+
+def line_through(*corners):
+    """A path over corners (x, y) [m], with a pose every few centimetres."""
+    steps = np.linspace(0.0, 1.0, 30)[:, None]
+    points = np.concatenate([np.array(a) + steps * np.subtract(b, a) for a, b in itertools.pairwise(corners)])
+    return Path.from_points(np.column_stack([points, np.zeros(len(points))]))
 
 
 def command_at(follower, pose):
@@ -96,6 +105,27 @@ def test_it_looks_half_as_far_ahead_for_obstacles_while_relaxed(make_plugin, pla
     follower.relaxation.grant("relax", Slack(controller_factor=2.0), until=follower.clock.now() + 5.0)
     assert blocked.outcome == ExePathOutcome.BLOCKED_PATH
     assert command_at(follower, Pose.planar(1.8, 3.0)).success
+
+
+def test_where_the_arc_to_the_usual_point_cuts_a_corner_it_pursues_a_nearer_one(make_plugin, plain, paint):
+    """From many places and headings before the corner of a block; whether or not the robot states its inertia."""
+
+    def block(places):
+        gap = np.hypot(np.maximum(3.4 - places[:, 0], 0.0), np.maximum(3.3 - places[:, 1], 0.0))
+        return np.where(gap == 0.0, np.inf, np.where(gap < 0.2, 1.0, 0.0))
+
+    navigation_map, nearer = paint(plain(), block), 0
+    at_once, slowly = (make_plugin(PathFollower, navigation_map, acc_lim_x=limit) for limit in (math.inf, 1e6))
+    for follower in (at_once, slowly):
+        follower.set_plan(line_through((2.5, 3.8), (3.5, 2.8), (5.5, 2.8)))
+    for step, yaw in itertools.product(np.arange(0.2, 0.8, 0.02), np.arange(-0.6, 0.6, 0.1)):
+        pose = Pose.planar(2.5 + step, 3.8 - step, yaw)
+        command, with_inertia = (command_at(follower, pose).command or Twist() for follower in (at_once, slowly))
+        if command.vx > 0.0 and with_inertia.vx > 0.0:
+            curvature = command.wz / command.vx
+            assert curvature == pytest.approx(with_inertia.wz / with_inertia.vx)
+            nearer += curvature != pytest.approx(arc_to(pose, at_once._target())[1])
+    assert nearer > 10
 
 
 def test_an_empty_path_and_a_path_in_another_frame_are_refused(make_plugin, plain):

@@ -174,7 +174,9 @@ def test_a_robot_off_the_surface_gets_the_answers_of_the_whole_mesh(tiled, whole
     whole, forward = whole_hills.map, Twist.planar(vx=0.5)
     whole.inscribed_radius = tiled.inscribed_radius
     place = whole_hills.free_places(1, 15)[0]
-    assert tiled.path_check(AS_CONFIGURED)(pose(place)) == whole.path_check(AS_CONFIGURED)(pose(place))
+    for room in (0.0, 0.3):
+        query = PlaceQuery(safety_dist=room)
+        assert tiled.path_check(query)(pose(place)) == whole.path_check(query)(pose(place))
     for there in (*(pose(place + np.array([0.0, 0.0, up])) for up in (0.8, 5.0)), Pose.planar(-300.0, 0.0)):
         assert tiled.obstacle_ahead(there, forward, 1.0) == whole.obstacle_ahead(there, forward, 1.0)
         assert tiled.obstacle_on_path(there, forward, 1.0) == whole.obstacle_on_path(there, forward, 1.0)

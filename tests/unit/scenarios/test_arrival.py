@@ -7,6 +7,7 @@ import pytest
 
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.rotations import quaternion_multiply
 from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
 from terrain.scenarios.faults import LocalizationJump
@@ -22,6 +23,16 @@ def test_an_arrival_compares_truth_and_belief_with_the_goal():
     arrival = Arrival.at(Pose.planar(1.0, 0.0, math.pi - 0.05), Pose.planar(1.0, 0.5, 0.05 - math.pi), result)
     assert (arrival.distance_m, arrival.estimated_distance_m) == (0.5, 0.1)
     assert arrival.angle_deg == pytest.approx(math.degrees(0.1))
+
+
+def test_on_a_slope_the_angle_is_the_one_that_the_robot_would_turn():
+    """A robot that stands across a slope of 30 degrees is as far off as its controller has left it, and not tilted."""
+    half = math.radians(15.0)
+    across = Pose((0.0, 0.0, 0.0), (math.sin(half), 0.0, 0.0, math.cos(half)))
+    turn = Pose.planar(0.0, 0.0, 0.25).orientation
+    left = Pose((0.0, 0.0, 0.0), quaternion_multiply(across.orientation, turn))
+    arrival = Arrival.at(Pose.planar(0.0, 0.0), left, MoveBaseResult(MoveBaseOutcome.SUCCESS, "", left, 0.0, 0.5))
+    assert arrival.angle_deg == arrival.estimated_angle_deg == pytest.approx(math.degrees(0.25))
 
 
 def test_what_an_executive_does_not_report_is_written_as_unknown():
