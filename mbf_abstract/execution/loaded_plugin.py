@@ -121,7 +121,7 @@ class LoadedPlugin(Generic[P]):
             except ThreadDetached:
                 continue  # it hung and came back late: what was asked for meanwhile is still to be done
             except BaseException as error:
-                self.report(goal_id, "cancel", error)
+                self.report("cancel", error, goal_id=goal_id)
 
     def _take_cancel(self) -> int | None:
         """Id of the goal whose cancel is to be passed on now; None = there is nothing left to do."""
@@ -140,13 +140,13 @@ class LoadedPlugin(Generic[P]):
             self._retired = True
             return True
 
-    def report(self, goal_id: int, method: str, error: BaseException) -> None:
-        """Record that the plugin raised, with where in its code it did."""
+    def report(self, method: str, error: BaseException, **of_goal: int) -> None:
+        """Record that the plugin raised, and where in its code; ``of_goal`` is ``goal_id`` where there is one."""
         frames = traceback.extract_tb(error.__traceback__)[-8:]
         self._runtime.events.emit(
             EventKind.FAULT,
             self.name,
-            goal_id=goal_id,
+            **of_goal,
             where=method,
             type=type(error).__name__,
             message=error_text(error),

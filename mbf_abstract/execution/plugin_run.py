@@ -151,7 +151,7 @@ class PluginRun(Generic[P]):
         except ThreadDetached:
             raise
         except BaseException as error:  # sys.exit() in a plugin must end its goal, not the thread of its slot
-            plugin.report(self.handle.id, method, error)
+            plugin.report(method, error, goal_id=self.handle.id)
             fault = PluginNonFinite if isinstance(error, NonFiniteError) else PluginFault
             text = f"plugin {plugin.name!r} raised {type(error).__name__} in {method}: {error_text(error)}"
             raise fault(text) from error

@@ -26,15 +26,16 @@ from mbf_abstract.event_bus import EventBus
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.supervisor import Supervisor
-from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.callbacks import CallbackThread
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import with_changes
-from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
+from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.map_interface import MapInterface
 from mbf_abstract.server.plugin_notes import MapNotes, notes_on_numbers, notes_on_plugins
 from mbf_abstract.server.process_end import ProcessEndWatch
+from mbf_abstract.server.warm_up import try_controller, try_planner
 from mbf_abstract.time.clock import Clock
 from mbf_abstract.time.sim_clock import SimClock
 
@@ -134,6 +135,8 @@ class AbstractNavigationServer(MapInterface):
     ) -> None:
         """Call every planner and controller once, without moving, so that their kernels are compiled before a goal.
 
+        One that misbehaves is passed over: it is recorded as a fault, or quarantined while it hangs.
+
         Parameters
         ----------
         start, goal : Pose
@@ -150,13 +153,10 @@ class AbstractNavigationServer(MapInterface):
         count = len(planners) + len(controllers)
         for number, planner in enumerate(planners, start=1):
             on_step(f"warming up planner {planner.name} ({number} of {count})")
-            result = planner.instance.make_plan(PlanRequest(start, goal))
-            path = result.path if result.success and result.path is not None else path
+            path = try_planner(self.runtime, planner, start, goal) or path
         for number, controller in enumerate(controllers, start=len(planners) + 1):
             on_step(f"warming up controller {controller.name} ({number} of {count})")
-            controller.instance.set_plan(path)
-            controller.instance.compute_velocity_commands(ControlRequest(start, Twist()))
-            controller.instance.is_goal_reached(start, self.runtime.parameters.dist_tolerance, 0.1)
+            try_controller(self.runtime, controller, path, start)
 
     # --------------------------------------------------------------------------------------- life cycle
     def cancel_all(self, reason: str = "all goals canceled") -> None:
