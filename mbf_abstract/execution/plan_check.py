@@ -51,7 +51,7 @@ def tolerance_problem(goal: ExePathGoal | MoveBaseGoal) -> str:
 def check_path(answer: PlanResult, request: PlanRequest, runtime: Runtime, area: GoalArea | None = None) -> PlanResult:
     """Check a successful answer; return it with the path in the global frame, or a failure without a path."""
     if answer.path is None or len(answer.path) == 0:
-        return PlanResult(GetPathOutcome.EMPTY_PATH, "the planner reported success but gave no poses")
+        return PlanResult(GetPathOutcome.EMPTY_PATH, "success was reported, but the path has no poses")
     try:
         path = path_in_global_frame(answer.path, runtime)
     except TransformError as error:
@@ -109,6 +109,6 @@ def path_result(
         )
     checked = check_path(answer, request, runtime, area)
     if checked.path is None:
-        return GetPathResult(checked.outcome, checked.message, **fields)
+        return GetPathResult(checked.outcome, f"planner {planner!r}: {checked.message}", **fields)
     cost = answer.cost if answer.cost != 0.0 else checked.path.length
     return GetPathResult(int(answer.outcome), answer.message or "plan found", path=checked.path, cost=cost, **fields)

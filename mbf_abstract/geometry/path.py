@@ -33,6 +33,16 @@ def _refuse_wrong_pose(positions: FloatArray, orientations: FloatArray, squared_
     raise ValueError(f"orientation of pose {i} has squared norm {squared_norms[i]:.6g}, expected 1")
 
 
+def _rows(values: ArrayLike, columns: int, what: str) -> FloatArray:
+    """Copy of an array (n, columns); points of two numbers would be read as fewer of three."""
+    rows = np.array(values, dtype=np.float64)
+    if rows.size == 0:
+        return rows.reshape(0, columns)
+    if rows.ndim != 2 or rows.shape[1] != columns:
+        raise ValueError(f"the {what} of a path have the shape {rows.shape}, expected (n, {columns})")
+    return rows
+
+
 @dataclass(frozen=True, eq=False)
 class Path:
     """A sequence of poses in one frame, stored as two read-only arrays.
@@ -64,11 +74,11 @@ class Path:
     guidance: Any = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        positions = np.array(self.positions, dtype=np.float64).reshape(-1, 3)
+        positions = _rows(self.positions, 3, "positions")
         if self.orientations is None:
             orientations = np.tile([0.0, 0.0, 0.0, 1.0], (len(positions), 1))
         else:
-            orientations = np.array(self.orientations, dtype=np.float64).reshape(-1, 4)
+            orientations = _rows(self.orientations, 4, "orientations")
         if len(positions) != len(orientations):
             raise ValueError(f"{len(positions)} positions but {len(orientations)} orientations")
         # Whole arrays first: which pose is wrong is looked for only if one may be.
@@ -127,8 +137,12 @@ class Path:
             Orientation of the last pose; without it the last pose keeps the heading of the one before.
         normals : (n, 3) float, optional
             Surface normals, the poses' z axes; without them z is up.
+
+        Raises ValueError as the class does.
         """
-        points = np.asarray(positions, dtype=np.float64).reshape(-1, 3)
+        points = _rows(positions, 3, "positions")
+        if normals is not None and np.shape(normals) != points.shape:
+            raise ValueError(f"the normals of a path have the shape {np.shape(normals)}, expected {points.shape}")
         ahead = np.tile([1.0, 0.0, 0.0], (len(points), 1))
         steps = np.diff(points, axis=0)
         moving = np.flatnonzero(steps.any(axis=1))

@@ -60,7 +60,7 @@ def test_a_lie_becomes_a_failure_that_names_it(lie, outcome, text):
         result = handle.wait()
         assert len(session.planner.requests) == 1  # the wrong claim was made
         assert (result.outcome, result.path) == (outcome, None)
-        assert text in result.message
+        assert text in result.message and "'planner'" in result.message
         assert_ended_once(session, handle)
         assert_next_goals_work(session)
 

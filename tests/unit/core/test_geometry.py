@@ -105,6 +105,21 @@ def test_the_last_pose_of_a_path_can_be_given():
     assert path[-1].yaw == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Path.from_points(np.ones((6, 2))), r"positions of a path have the shape \(6, 2\), expected \(n, 3\)"),
+        (lambda: Path(np.ones((6, 2))), r"positions of a path have the shape \(6, 2\), expected \(n, 3\)"),
+        (lambda: Path(np.ones(6)), r"positions of a path have the shape \(6,\), expected \(n, 3\)"),
+        (lambda: Path(np.ones((8, 3)), np.ones((6, 3))), r"orientations of .* shape \(6, 3\), expected \(n, 4\)"),
+        (lambda: Path.from_points(np.ones((6, 3)), None, np.ones((3, 3))), r"normals .* \(3, 3\), expected \(6, 3\)"),
+    ],
+)
+def test_arrays_of_another_shape_are_no_path(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
 def test_a_slice_of_a_path_is_a_path_in_the_same_frame():
     path = Path.from_points([(0, 0, 0), (1, 0, 0), (2, 0, 0)], frame_id="odom", stamp=3.0)
     assert len(path[1:]) == 2
