@@ -156,8 +156,8 @@ class ControllerExecution:
         if len(plan.path) == 0:
             return self._end(ControllerState.EMPTY_PLAN, ExePathOutcome.INVALID_PATH, "the path has no poses")
         self._controller.refusal = ""
-        if not (accepted := self._run.call("set_plan", partial(self._controller.set_plan, plan.path))):
-            reason = self._controller.refusal or ("set_plan returned None, not True" if accepted is None else "")
+        if not self._run.ask_whether("set_plan", partial(self._controller.set_plan, plan.path)):
+            reason = self._controller.refusal
             text = f"controller {self._run.plugin.name!r} refused the path{reason and f': {reason}'}"
             return self._end(ControllerState.INVALID_PLAN, ExePathOutcome.INVALID_PATH, text)
         if self._plan is None or plan.arrival.is_elsewhere(self._plan.arrival):

@@ -1,5 +1,6 @@
 """The controller execution; F-numbers are facts of the upstream tests, with their ids. Every test ends standing."""
 
+import numpy as np
 import pytest
 
 from mbf_abstract.execution.arrival import ArrivalCheck
@@ -64,12 +65,13 @@ def test_a_refused_plan_says_why_where_the_plugin_does(make_session):
     assert session.navigator.exe_path(session.path_to(2.0)).message == "controller 'controller' refused the path"
 
 
-def test_a_controller_that_forgets_to_accept_its_plan_is_told_so(make_session):
+@pytest.mark.parametrize(("answer", "kind"), [(None, "NoneType"), (np.ones(3, bool), "ndarray"), ("yes", "str")])
+def test_a_controller_that_neither_accepts_nor_refuses_its_plan_is_named(make_session, answer, kind):
     session = make_session()
-    session.controller.set_plan = lambda path: None
+    session.controller.set_plan = lambda path: answer
     result = session.navigator.exe_path(session.path_to(2.0))
-    assert result.outcome == Outcome.INVALID_PATH
-    assert result.message == "controller 'controller' refused the path: set_plan returned None, not True"
+    assert result.outcome == Outcome.INTERNAL_ERROR
+    assert result.message == f"plugin 'controller' returned {kind} from set_plan, not bool"
 
 
 def test_f280_without_a_robot_pose_it_holds_and_then_ends(make_session):
