@@ -23,6 +23,7 @@ SPAWNERS = (
     "mbf_abstract/drive/",
     "mbf_abstract/goals/",
     "mbf_abstract/server/process_end.py",
+    "mbf_abstract/server/warm_up.py",
     "mbf_abstract/testing/",
     "mbf_ros/ros2/",
     "mbf_ros/rosbridge/",
