@@ -14,6 +14,7 @@ import importlib
 import sys
 from collections.abc import Callable, Iterable
 from importlib.metadata import EntryPoint
+from pathlib import Path
 
 from mbf_abstract.config.findings import suggest
 from mbf_abstract.config.installed_plugins import GROUPS, PluginEntry, entry_of, origin_of, points_of
@@ -113,7 +114,7 @@ class PluginRegistry:
         try:
             importlib.reload(module)
         except (Exception, SystemExit) as error:  # a module may call sys.exit()
-            raise PluginError(_group(group), type_name, f"reload failed: {_describe(error)}") from error
+            raise PluginError(_group(group), type_name, f"reload failed: {import_problem(error)}") from error
         return self.load(group, type_name, base)
 
     def entries(self) -> list[PluginEntry]:
@@ -160,7 +161,7 @@ class PluginRegistry:
         try:
             return points[0].load()
         except (Exception, SystemExit) as error:
-            raise PluginError(group, name, f"import failed: {_describe(error)}") from error
+            raise PluginError(group, name, f"import failed: {import_problem(error)}") from error
 
     def _import_module_type(self, group: str, type_name: str) -> object:
         if not self.allow_module_types:
@@ -169,7 +170,7 @@ class PluginRegistry:
         try:
             return getattr(importlib.import_module(module_name), class_name)
         except (Exception, SystemExit) as error:
-            raise PluginError(group, type_name, f"import failed: {_describe(error)}") from error
+            raise PluginError(group, type_name, f"import failed: {import_problem(error)}") from error
 
     def _checked(self, group: str, type_name: str, plugin_class: object, base: type | None) -> type:
         if not isinstance(plugin_class, type):
@@ -203,5 +204,9 @@ def _group(group: PluginKind | str) -> str:
     return group.value if isinstance(group, PluginKind) else group
 
 
-def _describe(error: BaseException) -> str:
-    return f"{type(error).__name__}: {error_text(error)}"
+def import_problem(error: BaseException) -> str:
+    """What an import raised, and what helps where the module lies in the folder in which the program was started."""
+    text = f"{type(error).__name__}: {error_text(error)}"
+    if isinstance(error, ModuleNotFoundError) and error.name and Path(f"{error.name}.py").is_file():
+        return f"{text}; {error.name}.py lies here, but not on the Python path: set PYTHONPATH=. or install it"
+    return text

@@ -147,6 +147,15 @@ def test_what_cannot_be_used_is_refused_alike_as_module_type_and_as_entry_point(
     assert reason(registry, "bad").startswith(expected)
 
 
+def test_of_a_module_in_the_folder_of_the_user_the_text_says_how_it_is_found(tmp_path, monkeypatch):
+    (tmp_path / "my_own_module.py").write_text("", "utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [entry for entry in sys.path if entry])
+    assert reason(PluginRegistry("mesh"), "my_own_module:Planner").endswith(
+        "my_own_module.py lies here, but not on the Python path: set PYTHONPATH=. or install it"
+    )
+
+
 def test_module_types_can_be_switched_off(plugin_module):
     assert load(PluginRegistry(), "plugin_module_under_test:Planner").version == 1
     registry = PluginRegistry(allow_module_types=False)
