@@ -82,6 +82,11 @@ class TreeExecutive:
             For trees that plan.
         path : Path, optional
             For trees that follow a path they are given.
+
+        Raises
+        ------
+        RuntimeError
+            A node's ``update`` returned no status. What a node raises is raised, too.
         """
         mission = MissionContext(self._navigator, target, path)
         self._cancel_reason = ""
@@ -140,6 +145,10 @@ class TreeExecutive:
         while not self._cancel_reason:
             self.tree.tick_once()
             self._ticks += 1
+            if self.tree.status == Status.INVALID:  # py_trees takes it for that
+                raise RuntimeError(
+                    f"{self.tree.name!r} has no status: a node answered neither SUCCESS, FAILURE nor RUNNING"
+                )
             self._report_tip()
             self._reporter.report(self._ticks)
             for listener in self.on_tick:

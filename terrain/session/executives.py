@@ -7,6 +7,7 @@ All of them block the thread that calls ``drive`` until the goal has ended and c
 from __future__ import annotations
 
 import importlib
+import traceback
 from collections.abc import Callable
 from functools import partial
 from typing import Protocol, TypeAlias
@@ -16,6 +17,7 @@ from py_trees.common import Status
 from py_trees.composites import Sequence
 
 from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.registry import import_problem
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.event_values import error_text
 from mbf_abstract.executives.reference_trees import REFERENCE_TREES, TreeOptions, control_tree, planning_tree
@@ -27,6 +29,7 @@ from mbf_abstract.goals.result_types import MoveBaseResult
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import MoveBaseOutcome
 from mbf_abstract.plugins import PluginKind
+from mbf_abstract.time.program_end import is_for_the_program
 from terrain.experiments.classic_move_base.settings import ClassicSettings
 from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
 
@@ -102,11 +105,22 @@ def _tree_of(target: str) -> TreeMaker:
     try:
         make_tree = getattr(importlib.import_module(module), name)
     except (Exception, SystemExit) as error:  # the module is somebody else's
-        found = f"{target}: {type(error).__name__}: {error_text(error)}"
+        found = f"{target}: {import_problem(error)}"
         raise ConfigError([Finding("--executive", 1, "", "module:function of a tree", found)]) from error
     if not callable(make_tree):
         raise ConfigError([Finding("--executive", 1, "", "a function that makes a tree", f"{target}: {make_tree!r}")])
-    return make_tree  # type: ignore[no-any-return]
+
+    def checked(options: TreeOptions) -> Behaviour:
+        try:
+            tree = make_tree(options)
+        except Exception as error:
+            found = f"{target}: {type(error).__name__}: {error_text(error)}"
+            raise ConfigError([Finding("--executive", 1, "", "a function that makes a tree", found)]) from error
+        if not isinstance(tree, Behaviour):
+            raise ConfigError([Finding("--executive", 1, "", "a tree of py_trees", f"{target} made {tree!r}")])
+        return tree
+
+    return checked
 
 
 class MoveBaseDrive:
@@ -142,8 +156,14 @@ class TreeDrive:
         self._executive = TreeExecutive(make_tree(self._options(planner, controller)), navigator)
 
     def run(self, goal: Pose) -> MoveBaseResult:
-        """Tick the tree until it ends."""
-        return self._as_move_base(self._executive.run(goal), goal)
+        """Tick the tree until it ends; what a node raises is the end of the goal."""
+        try:
+            return self._as_move_base(self._executive.run(goal), goal)
+        except Exception as error:
+            if is_for_the_program(error):
+                raise
+            text = f"tree {self._executive.tree.name!r}: {_raiser(error)}{type(error).__name__}: {error_text(error)}"
+            return MoveBaseResult(int(MoveBaseOutcome.INTERNAL_ERROR), text)
 
     def cancel(self, reason: str) -> None:
         """End the tree's run."""
@@ -182,3 +202,10 @@ class TreeDrive:
         except RobotStateError:
             return MoveBaseResult(outcome, result.message)
         return MoveBaseResult(outcome, result.message, pose, pose.distance_to(goal), pose.angle_to(goal))
+
+
+def _raiser(error: Exception) -> str:
+    """Which node of a tree has raised, for a message; empty if none has."""
+    owners = [frame.f_locals.get("self") for frame, _ in traceback.walk_tb(error.__traceback__)]
+    names = [node.name for node in owners if isinstance(node, Behaviour)]
+    return f"node {names[-1]!r} raised " if names else ""
