@@ -98,3 +98,24 @@ class Composite(MissionNode, PyTreesComposite):  # type: ignore[misc, unused-ign
             if child.status != Status.INVALID and not kept:
                 child.stop(Status.INVALID)
         super().stop(new_status)
+
+
+class PickedChild(Composite):
+    """Runs the child that ``pick`` names; fails where that is none. What the others remember stays."""
+
+    children_remember = True
+    _picked: Behaviour | None = None
+
+    @abstractmethod
+    def pick(self) -> Behaviour | None:
+        """Name the child that is run until this node ends."""
+
+    def initialise(self) -> None:
+        """Pick when entered."""
+        self._picked = self.pick()
+
+    def tick_children(self) -> Generator[Behaviour, None, Status]:
+        """Tick the picked child."""
+        if self._picked is None:
+            return Status.FAILURE
+        return (yield from self.tick_child(self._picked))

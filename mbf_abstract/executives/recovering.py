@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection, Generator, Sequence
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from mbf_abstract.executives.nodes import Composite, Decorator
+from mbf_abstract.executives.nodes import Composite, Decorator, PickedChild
 
 
 class TaskWithRecoveries(Composite):
@@ -166,26 +166,18 @@ class OutcomeGuard(Decorator):
         return self.decorated.status if self._open else Status.FAILURE
 
 
-class PickByOutcome(Composite):
+class PickByOutcome(PickedChild):
     """Run the first guarded child that fits the last failure; fail where none fits. What the others remember stays."""
-
-    children_remember = True
 
     def __init__(self, name: str, children: Sequence[OutcomeGuard]) -> None:
         super().__init__(name, children)
-        self._picked: OutcomeGuard | None = None
 
-    def initialise(self) -> None:
-        """Pick when entered."""
+    def pick(self) -> Behaviour | None:
+        """Look for the first child that accepts the mission's failure."""
         code = self.mission.failure_code
-        self._picked = next((child for child in self.children if child.accepts(code)), None)
-        self.feedback_message = f"code {code}: {self._picked.name if self._picked else 'nothing fits'}"
-
-    def tick_children(self) -> Generator[Behaviour, None, Status]:
-        """Tick the picked child."""
-        if self._picked is None:
-            return Status.FAILURE
-        return (yield from self.tick_child(self._picked))
+        picked = next((child for child in self.children if child.accepts(code)), None)
+        self.feedback_message = f"code {code}: {picked.name if picked else 'nothing fits'}"
+        return picked
 
 
 class InOrder(Composite):

@@ -28,7 +28,7 @@ from collections.abc import Callable, Iterable
 from typing import ClassVar
 
 from mbf_abstract.drive.robot import RobotStateError
-from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry import Pose, Twist, normalize_angle
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.navigation_map import NavigationMap
@@ -122,6 +122,17 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
             if not motion.sleep(self.parameters.control_period):
                 break
         return ended_by_others(token)
+
+    def turn_to_heading(self, request: RecoveryRequest, yaw: float, limit: float, tolerance: float) -> RecoveryResult:
+        """Turn on the spot to a heading [rad], no faster than ``limit`` [rad/s], until ``tolerance`` [rad] is left."""
+
+        def left(pose: Pose) -> float:
+            return normalize_angle(yaw - pose.yaw)
+
+        def velocity(pose: Pose) -> Twist:
+            return Twist.planar(wz=max(-limit, min(limit, 2.0 * left(pose))))
+
+        return self.drive(request, velocity, lambda pose: abs(left(pose)) <= tolerance)
 
 
 def ended_by_others(token: CancelToken) -> RecoveryResult:

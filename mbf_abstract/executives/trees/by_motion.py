@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 
 from py_trees.behaviour import Behaviour
@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.mission import MissionContext
-from mbf_abstract.executives.nodes import Composite, Leaf
+from mbf_abstract.executives.nodes import Leaf, PickedChild
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.result_types import ActionResult
 from mbf_abstract.maps.tracking.blocking import Blockage
@@ -33,7 +33,7 @@ ALONG = 0.7
 """From this cosine on between the path and its way somebody goes along the path."""
 
 
-class PickByMotion(Composite):
+class PickByMotion(PickedChild):
     """Run the child for how the first tracked object on the path ahead moves. What the others remember stays.
 
     Parameters
@@ -53,8 +53,6 @@ class PickByMotion(Composite):
         Who is this near [m] to the robot's outline on the path is in the way: a controller cuts the path's corners.
     """
 
-    children_remember = True
-
     def __init__(
         self,
         name: str,
@@ -72,25 +70,17 @@ class PickByMotion(Composite):
         self.length = length
         self.standing = standing
         self.margin = margin
-        self._picked: Behaviour | None = None
 
-    def initialise(self) -> None:
-        """Ask the map when entered; where it cannot say, nobody is in the way."""
+    def pick(self) -> Behaviour | None:
+        """Ask the map; where it cannot say, nobody is in the way."""
         first = first_in_the_way(self.mission, self.length, self.margin)
         if first is None:
-            self._picked, self.feedback_message = self.nobody, "nobody"
-            return
+            self.feedback_message = "nobody"
+            return self.nobody
         motion = first.by.motion if first.by.standing >= self.standing else Motion.MOVING
-        self._picked = self.by_motion.get(motion)
-        if motion is Motion.WAITING and waits_for_robot(first):
-            self._picked = self.came or self._picked
         self.feedback_message = f"{motion.value}, {first.distance:.1f} m ahead"
-
-    def tick_children(self) -> Generator[Behaviour, None, Status]:
-        """Tick the picked child."""
-        if self._picked is None:
-            return Status.FAILURE
-        return (yield from self.tick_child(self._picked))
+        picked = self.by_motion.get(motion)
+        return self.came or picked if motion is Motion.WAITING and waits_for_robot(first) else picked
 
 
 def blockages_ahead(mission: MissionContext, margin: float) -> list[Blockage]:

@@ -8,7 +8,7 @@ from itertools import groupby
 import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
+from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery, ended_by_others
@@ -86,11 +86,14 @@ class ManoeuvreRecovery(GuardedRecovery):
         for gear, section in groupby(steps, key=lambda step: step.gear):
             planned = [at, *(pose for step in section for pose in step.poses)]
             poses = [frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id="begin")) for x, y, yaw in planned]
-            result = self._turn(request, poses[-1]) if gear == 0 else self._follow(request, poses, gear)
+            result = self._turn(request, poses[-1].yaw) if gear == 0 else self._follow(request, poses, gear)
             if not result.success or is_enough(request.motion.pose()):
                 return result
             at = planned[-1]
         return RecoveryResult(RecoveryOutcome.SUCCESS)
+
+    def _turn(self, request: RecoveryRequest, yaw: float) -> RecoveryResult:
+        return self.turn_to_heading(request, yaw, self.parameters.yaw_rate, HEADING_REACHED)
 
     def _follow(self, request: RecoveryRequest, poses: list[Pose], gear: int) -> RecoveryResult:
         """Drive along poses in one gear, by pure pursuit; the last one is prolonged for the point steered to."""
@@ -112,15 +115,3 @@ class ManoeuvreRecovery(GuardedRecovery):
     def obstacle_on_manoeuvre(self, pose: Pose, command: Twist) -> str:
         """As for a path: a manoeuvre is searched where the robot touches nothing, and asked for no more."""
         return self.navigation_map.obstacle_on_path(self.on_map(pose), command, self.parameters.check_ahead_time)
-
-    def _turn(self, request: RecoveryRequest, end: Pose) -> RecoveryResult:
-        """Turn on the spot to a heading."""
-
-        def left(pose: Pose) -> float:
-            return normalize_angle(end.yaw - pose.yaw)
-
-        def velocity(pose: Pose) -> Twist:
-            limit = self.parameters.yaw_rate
-            return Twist.planar(wz=max(-limit, min(limit, 2.0 * left(pose))))
-
-        return self.drive(request, velocity, lambda pose: abs(left(pose)) <= HEADING_REACHED)

@@ -52,7 +52,8 @@ class MoveAwayRecovery(GuardedRecovery):
         result = self._move(request)
         if result.outcome == RecoveryOutcome.IMPASSABLE and self._can_turn:
             turn = self._turn_wanted(request.motion.pose())
-            if abs(turn) > ASIDE and self._turn(request, turn).success:
+            heading = normalize_angle(request.motion.pose().yaw + turn)
+            if abs(turn) > ASIDE and self.turn_to_heading(request, heading, self.parameters.yaw_rate, TURNED).success:
                 result = self._move(request)
         reached = float(norm(self._nearest_obstacle(request.motion.pose())))
         clearance = f"{reached:.2f} m" if math.isfinite(reached) else f"more than {self.parameters.clearance:.2f} m"
@@ -88,18 +89,6 @@ class MoveAwayRecovery(GuardedRecovery):
         x, y, _ = self._nearest_obstacle(pose).tolist()
         bearing = math.atan2(y, x)
         return bearing if abs(bearing) <= 0.5 * math.pi else normalize_angle(bearing + math.pi)
-
-    def _turn(self, request: RecoveryRequest, angle: float) -> RecoveryResult:
-        wanted = normalize_angle(request.motion.pose().yaw + angle)
-
-        def left(pose: Pose) -> float:
-            return normalize_angle(wanted - pose.yaw)
-
-        def velocity(pose: Pose) -> Twist:
-            limit = self.parameters.yaw_rate
-            return Twist.planar(wz=max(-limit, min(limit, 2.0 * left(pose))))
-
-        return self.drive(request, velocity, lambda pose: abs(left(pose)) <= TURNED)
 
     def _nearest_obstacle(self, pose: Pose) -> NDArray[np.float64]:
         """Position (3,) [m] of the nearest obstacle in the base frame; infinite if it is beyond the clearance."""
