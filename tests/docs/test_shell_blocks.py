@@ -53,12 +53,13 @@ def mbf():
 
 @pytest.mark.parametrize("page", sorted({page for page, words in COMMANDS if words[0] == "mbf"}))
 def test_every_command_of_a_page_is_read_by_the_command_line(page, mbf):
-    for name, words in COMMANDS:
-        if name == page and words[0] == "mbf":
-            try:
-                mbf.main(words[1:], standalone_mode=False)
-            except Exception as error:
-                pytest.fail(f"{shlex.join(words)}: {error}")
+    wrong = []
+    for words in [words for name, words in COMMANDS if name == page and words[0] == "mbf"]:
+        try:
+            mbf.main(words[1:], standalone_mode=False)
+        except Exception as error:
+            wrong.append(f"{shlex.join(words)}: {error}")
+    assert not wrong
 
 
 def test_every_block_names_its_language():

@@ -164,17 +164,17 @@ def test_every_member_of_a_disc_is_inside_it():
 
 
 @pytest.mark.parametrize(
-    "make",
+    ("make", "why"),
     [
-        lambda: DiscArea(Pose.planar(0, 0), 0.0),
-        lambda: PolygonArea(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))),
-        lambda: PolygonArea(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))),
-        lambda: PoseSetArea(()),
-        lambda: PoseSetArea((Pose.planar(0, 0), Pose.planar(0, 0, frame_id="odom"))),
+        (lambda: DiscArea(Pose.planar(0, 0), 0.0), "the radius must be positive"),
+        (lambda: PolygonArea(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))), "at least three corners, got 2"),
+        (lambda: PolygonArea(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))), "encloses no area"),
+        (lambda: PoseSetArea(()), "at least one pose"),
+        (lambda: PoseSetArea((Pose.planar(0, 0), Pose.planar(0, 0, frame_id="odom"))), "all in one frame"),
     ],
 )
-def test_an_area_without_inside_is_refused(make):
-    with pytest.raises(ValueError):
+def test_an_area_without_inside_is_refused(make, why):
+    with pytest.raises(ValueError, match=why):
         make()
 
 

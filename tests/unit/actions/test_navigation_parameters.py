@@ -70,7 +70,7 @@ def test_a_parameter_is_dynamic_as_in_mbf(name):
 def test_a_value_out_of_range_is_refused_and_nothing_changes(make_session, bad):
     session = make_session()
     before = session.server.runtime.parameters
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match="|".join(bad)):
         session.server.set_parameters(**bad)
     assert session.server.runtime.parameters is before
 

@@ -38,7 +38,7 @@ def test_a_place_in_other_coordinates_is_refused_with_what_is_meant(survey, plac
 @pytest.mark.parametrize("place", [(0.0, 0.0), (79_000.0, 111_000.0), (-1000.0, -1000.0)])
 def test_places_on_and_beside_the_map_are_taken(survey, place):
     """A tile of SRTM is 137 km from corner to corner; what is beside a map has a verdict of its planner."""
-    refuse_elsewhere(survey, Path("valley.tif"), start=Place(*survey.from_map(*place)))
+    assert refuse_elsewhere(survey, Path("valley.tif"), start=Place(*survey.from_map(*place))) is None
 
 
 def test_degrees_on_a_map_in_metres_are_one_error_of_a_plan(tmp_path):

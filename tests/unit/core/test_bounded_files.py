@@ -79,7 +79,7 @@ def test_a_nasty_array_is_refused_and_runs_nothing(tmp_path, monkeypatch, conten
 def test_damage_anywhere_in_the_file_is_one_kind_of_error(tmp_path):
     np.savez_compressed(tmp_path / "good.npz", z=np.random.default_rng(0).random(50), dx=1.0)
     good = (tmp_path / "good.npz").read_bytes()
-    rng = np.random.default_rng(1)
+    rng, errors = np.random.default_rng(1), []
     for _ in range(300):
         content = bytearray(good)
         for _ in range(rng.integers(1, 4)):
@@ -88,4 +88,6 @@ def test_damage_anywhere_in_the_file_is_one_kind_of_error(tmp_path):
         try:
             read_arrays(tmp_path / "damaged.npz", 10_000)
         except ArrayFileError as error:
-            assert "\n" not in str(error)
+            errors.append(str(error))
+    assert len(errors) > 200
+    assert not any("\n" in error for error in errors)

@@ -4,7 +4,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from mbf_abstract.maps.manoeuvres import GEAR_CHANGE_COST, HEADING, STEP, find_manoeuvre, kinds_of_steps
@@ -43,9 +43,12 @@ def least_cost(is_free, left, depth, turning_radius, at=ORIGIN, gear=0):
 
 
 @given(DISCS, st.floats(0.1, 0.6), st.sampled_from([0.0, 0.8]))
+@example([], 0.5, 0.0)
+@example([], 0.5, 0.8)
 def test_a_manoeuvre_joins_is_free_and_ends_where_it_shall(discs, distance, turning_radius):
     is_free, left = clear_of(discs), off_the_axis(distance)
     steps = find_manoeuvre(is_free, left, 3.0, turning_radius)
+    assert steps is not None or discs, "nothing is in its way"
     if steps is None:
         return
     at = ORIGIN
@@ -60,11 +63,14 @@ def test_a_manoeuvre_joins_is_free_and_ends_where_it_shall(discs, distance, turn
 
 
 @given(DISCS, st.floats(0.1, 0.3), st.sampled_from([0.0, 0.8]))
+@example([], 0.2, 0.0)
+@example([], 0.2, 0.8)
 def test_no_sequence_of_steps_is_shorter_by_more_than_a_step(discs, distance, turning_radius):
     """Poses that share a cell are one state, so it may miss the very shortest by a little, but not by a step."""
     is_free, left = clear_of(discs), off_the_axis(distance)
     naive = least_cost(is_free, left, 3, turning_radius)
     steps = find_manoeuvre(is_free, left, 4.0, turning_radius)
+    assert naive < math.inf or discs, "nothing is in its way"
     if naive < math.inf:
         assert steps is not None and cost_of(steps) <= naive + STEP
 
@@ -100,7 +106,9 @@ def test_a_robot_that_turns_on_the_spot_does_so_where_it_is_shorter():
 
 
 def test_a_car_keeps_to_its_turning_radius():
-    for step in find_manoeuvre(lambda pose: True, off_the_axis(1.0), 9.0, turning_radius=1.2):
+    steps = find_manoeuvre(lambda pose: True, off_the_axis(1.0), 9.0, turning_radius=1.2)
+    assert steps
+    for step in steps:
         turned = step.poses[-1][2] - step.poses[0][2]
         driven = math.dist(step.poses[-1][:2], step.poses[0][:2])
         assert step.gear != 0 and abs(turned) <= driven / 1.2 + 0.01

@@ -93,10 +93,8 @@ def test_cover_holds_all_cells_the_polygon_enters_and_none_it_does_not_touch(cor
             row, column = iy - y0, ix - x0
             covered = 0 <= row < mask.shape[0] and 0 <= column < mask.shape[1] and bool(mask[row, column])
             part = clipped_area_bounds(polygon, ix, iy)
-            if not len(part):
-                assert not covered or min(abs(polygon - [ix, iy]).min(), 1e-6) <= 1e-6
-            elif np.ptp(part, axis=0).min() > 1e-6:
-                assert covered
+            assert len(part) or not covered or min(abs(polygon - [ix, iy]).min(), 1e-6) <= 1e-6
+            assert covered or not len(part) or np.ptp(part, axis=0).min() <= 1e-6
 
 
 def test_a_concave_polygon_leaves_its_notch_out():

@@ -18,7 +18,7 @@ from mbf_mesh_nav.search import heading_check
 from tests.unit.mesh_planning.test_heading_limits import ROUNDING, footprint_use, rough_map
 
 PLANNERS = (DijkstraPlanner, AStarPlanner, CVPPlanner, AnyAnglePlanner, RepairingPlanner)
-SEEDS = range(4)
+SEEDS = (0, 2, 3)  # on the terrain of seed 1 no plan is without a note
 FORBIDS = "the tilt forbids the heading"
 
 
@@ -57,10 +57,11 @@ def uses_by_hand(mesh_map, request, positions):
 def test_a_plan_without_a_note_keeps_to_headings_the_tilt_allows(make_plugin, planner_class, seed):
     mesh_map = rough_map(seed)
     planner = make_plugin(planner_class, mesh_map)
-    for request in requests(mesh_map, seed):
-        result = planner.make_plan(request)
-        if result.success and FORBIDS not in result.message:
-            assert uses_by_hand(mesh_map, request, result.path.positions).max() <= 1.0 + ROUNDING
+    plans = [(request, planner.make_plan(request)) for request in requests(mesh_map, seed)]
+    allowed = [(request, plan) for request, plan in plans if plan.success and FORBIDS not in plan.message]
+    assert allowed
+    for request, plan in allowed:
+        assert uses_by_hand(mesh_map, request, plan.path.positions).max() <= 1.0 + ROUNDING
 
 
 @pytest.mark.parametrize("planner_class", PLANNERS)

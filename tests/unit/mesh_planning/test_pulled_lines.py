@@ -121,7 +121,7 @@ def test_a_path_over_a_hole_is_no_path(make_plugin, plain_with_a_hole, y):
 
 
 def test_lines_over_a_hole_leave_the_map_and_those_beside_it_do_not(plain_with_a_hole):
-    rng = np.random.default_rng(4)
+    rng, crossing, apart = np.random.default_rng(4), 0, 0
     for _ in range(200):
         points = np.column_stack([rng.uniform(0.1, 7.9, (6, 2)), np.zeros(6)])
         points = points[np.abs(points[:, :2] - 4.0).max(axis=1) > 1.0]
@@ -134,10 +134,10 @@ def test_lines_over_a_hole_leave_the_map_and_those_beside_it_do_not(plain_with_a
             for a, b in itertools.pairwise(points)
         ]
         first = plain_with_a_hole.first_line_outside(points)
-        if any(over):
-            assert 0 <= first <= over.index(True)
-        if all(beside):
-            assert first == -1
+        assert not any(over) or 0 <= first <= over.index(True)
+        assert not all(beside) or first == -1
+        crossing, apart = crossing + any(over), apart + all(beside)
+    assert min(crossing, apart) > 20
 
 
 def test_discs_touch_what_a_pose_there_touches(world):

@@ -130,8 +130,9 @@ def test_two_that_stand_beside_each_other_have_not_missed_each_other():
 @pytest.mark.parametrize("kind", [0.0, -1.0], ids=["contact", "near miss"])
 @given(speed=st.floats(0.0, 3.0), closest=st.floats(0.0, 0.15))
 def test_a_robot_that_stands_is_never_who_moved(kind, speed, closest):
-    for incident in encounter([0.5, closest, 0.5], speed, touched_below=kind + closest):
-        assert incident.moved in (Mover.OTHER, Mover.NEITHER)
+    incidents = encounter([0.5, closest, 0.5], speed, touched_below=kind + closest)
+    assert incidents or speed < 0.05, "two that stand"
+    assert {incident.moved for incident in incidents} <= {Mover.OTHER, Mover.NEITHER}
 
 
 @pytest.mark.parametrize(

@@ -387,3 +387,13 @@ def test_points_of_who_stops_are_no_longer_those_of_someone_who_moves():
         numbers = tracker.insert(disc(*place), SENSOR, step * PERIOD)
         moving.append(bool(tracker.are_moving(numbers).any()))
     assert moving[10] and moving[20] and not moving[-1]
+
+
+def test_two_scans_of_one_moment_are_both_taken_in_and_an_older_one_is_not():
+    tracker = Tracker(TrackingParameters(), "map")
+    for step in range(10):
+        for y in (-1.0, 1.0):  # what two sensors see
+            tracker.insert(disc(2.0, y), SENSOR, step * PERIOD)
+        late = tracker.insert(disc(-2.0, 1.0), SENSOR, (step - 1) * PERIOD)
+        assert not late.any()
+    assert [(round(one.x), round(one.y)) for one in tracker.objects(9 * PERIOD)] == [(2, -1), (2, 1)]

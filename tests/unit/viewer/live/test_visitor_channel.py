@@ -79,12 +79,15 @@ def test_whatever_comes_nothing_is_raised_and_only_right_values_arrive():
         number = rng.integers(len(values) + (2 if depth < 3 else 0))
         return values[number] if number < len(values) else [any_value(depth + 1) for _ in range(rng.integers(4))]
 
+    calls = []
     for _ in range(2000):
         names = rng.choice(["point", "goal", "stick", "look", "role", "leave"], size=rng.integers(1, 3), replace=False)
         message = json.dumps({str(name): any_value() for name in names})
-        for call in done_by(message) + done_by(message.encode()) + done_by(message[: rng.integers(len(message))]):
-            numbers = np.array([one for one in call[2:] if isinstance(one, tuple)] or 0.0, dtype=float)
-            assert (np.abs(numbers) <= 1.0).all() and all(one != "leave" for one in call)
+        calls += done_by(message) + done_by(message.encode()) + done_by(message[: rng.integers(len(message))])
+    assert {name for name, *_ in calls} == {"point", "look", "release_stick"}
+    for call in calls:
+        numbers = np.array([one for one in call[2:] if isinstance(one, tuple)] or 0.0, dtype=float)
+        assert (np.abs(numbers) <= 1.0).all() and all(one != "leave" for one in call)
 
 
 class Served:
