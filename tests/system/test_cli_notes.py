@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
-from mbf_abstract.cli import make_app
+from command_line import mbf
 from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_mesh_nav.map.map_builder import build_mesh_map
 from mbf_mesh_nav.map.map_parameters import MeshMapParameters
@@ -33,10 +32,6 @@ goals: [{x: 2.0, y: 3.0}]
 time_limit: 10.0
 navigation: {costmap: server.yaml}
 """
-
-
-def mbf(*arguments):
-    return CliRunner().invoke(make_app(), [str(argument) for argument in arguments])
 
 
 @pytest.fixture

@@ -10,19 +10,14 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
-from typer.testing import CliRunner
 
-from mbf_abstract.cli import make_app
+from command_line import mbf
 from mbf_abstract.commands import doctor
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from terrain.worlds.heightfield import Heightfield
 
 OFFICE = Path(__file__).resolve().parents[2] / "terrain" / "data" / "office.yaml"
 HEAVY = ("numba", "scipy", "trimesh", "pybullet", "numpy", "pydantic", "matplotlib", "viser", "rich")
-
-
-def mbf(*arguments):
-    return CliRunner().invoke(make_app(), [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

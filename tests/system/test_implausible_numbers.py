@@ -6,9 +6,8 @@ import re
 import numpy as np
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
-from mbf_abstract.cli import make_app
+from command_line import mbf
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 CONFIGURATIONS = {
@@ -29,10 +28,6 @@ EXPECTED = {
         "mesh_map: layer 'inflation': inflation_radius 24 m is more",
     ],
 }
-
-
-def mbf(*arguments):
-    return CliRunner().invoke(make_app(), [str(argument) for argument in arguments])
 
 
 @pytest.fixture

@@ -8,9 +8,8 @@ import venv
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from mbf_abstract.cli import make_app
+from command_line import mbf
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.config.registry import PluginRegistry
 from terrain.session.executives import make_executive
@@ -20,10 +19,6 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 INSTALL = ("install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation")
 ON_A_MAP = ("planner", "controller", "recovery", "layer")
 ON_EVERY_MAP = ("controller", "recovery", "executive")
-
-
-def mbf(*arguments):
-    return CliRunner().invoke(make_app(), [str(argument) for argument in arguments])
 
 
 def test_the_tests_of_new_packages_pass(tmp_path):

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from mbf_abstract.cli import make_app
+from command_line import mbf
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.tiles.building.build import build_tiles
 from mbf_mesh_nav.tiles.building.sources import HeightSource
@@ -57,10 +56,6 @@ def scenario(tmp_path):
     (tmp_path / "nav.yaml").write_text(NAVIGATION)
     (tmp_path / "scenario.yaml").write_text(SCENARIO)
     return tmp_path / "scenario.yaml"
-
-
-def mbf(*arguments):
-    return CliRunner().invoke(make_app(), [str(argument) for argument in arguments])
 
 
 def test_a_run_on_tiles_is_checked_driven_and_drawn_with_what_the_lidar_saw(scenario, tmp_path, monkeypatch):

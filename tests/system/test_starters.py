@@ -6,9 +6,8 @@ from string import Template
 import numpy as np
 import pytest
 import trimesh
-from typer.testing import CliRunner
 
-from mbf_abstract.cli import make_app
+from command_line import mbf
 from mbf_abstract.commands.starters import starters
 from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
@@ -30,10 +29,6 @@ ROBOTS = {
     "mesh_differential": "turtlebot",
     "mesh_skid_steered": "husky",
 }
-
-
-def mbf(*arguments):
-    return CliRunner().invoke(make_app(), [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,8 @@ import json
 import re
 
 import pytest
-from typer.testing import CliRunner
 
-from mbf_abstract.cli import make_app
+from command_line import mbf
 from mbf_abstract.event_sinks import read_events
 from mbf_abstract.events import EventKind
 from terrain.recording.run_folder import read_run
@@ -15,10 +14,6 @@ from terrain.sweeps.log import SweepLog
 from terrain.viewer.pictures.colours import WARNING
 
 pytestmark = [pytest.mark.timeout(300), pytest.mark.usefixtures("one_core")]
-
-
-def mbf(*arguments):
-    return CliRunner(env={"COLUMNS": "300"}).invoke(make_app(), [str(argument) for argument in arguments])
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from mbf_abstract.cli import make_app
+from command_line import mbf
 from mbf_abstract.commands.check import check as check_command
 from mbf_abstract.config.yaml_source import load_yaml
 from terrain.commands.check import check
@@ -64,10 +64,6 @@ def write(folder, mistakes=()):
 
 def found(report, folder):
     return {(finding.file.removeprefix(f"{folder}/"), finding.key) for finding in report.findings}
-
-
-def mbf(*arguments):
-    return CliRunner(env={"COLUMNS": "200"}).invoke(make_app(), [str(argument) for argument in arguments])
 
 
 @settings(max_examples=6)
