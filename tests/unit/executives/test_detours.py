@@ -7,6 +7,7 @@ import pytest
 
 from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
+from mbf_abstract.executives.trees.by_motion import EndDrive
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.maps.tracking.blocking import Blockage
@@ -96,6 +97,31 @@ def test_one_that_stopped_when_the_robot_crept_already_stopped_for_it(make_sessi
         session.planner.play(straight_plan, NO_PATH)
         assert run(session).success
         assert recoveries(session)[:1] == yields
+
+
+@pytest.mark.parametrize(("second", "ends"), [((12.5, 3.5), "FS"), ((11.0, 4.0), "FF")], ids=["same stop", "earlier"])
+def test_one_that_stopped_earlier_than_it_seemed_did_not_stop_for_the_robot(tick, second, ends):
+    """It is seen to have stood for 1 s at 10 s, then for longer."""
+    seen, failures = [(10.0, 1.0), second], []
+
+    def what_blocks(path, margin):
+        return (somebody(standing=seen[0][1], along=-1.0),)
+
+    server = SimpleNamespace(queries=SimpleNamespace(what_blocks=what_blocks))
+    clock = SimpleNamespace(now=lambda: seen.pop(0)[0])
+    drive_over = EndDrive("drive is over?")
+    drive_over.setup(
+        mission=SimpleNamespace(
+            clock=clock,
+            navigator=SimpleNamespace(server=server),
+            path=(),
+            path_to_follow=tuple,
+            detour_asked=None,
+            fail=failures.append,
+        )
+    )
+    assert tick(drive_over) + tick(drive_over) == ends
+    assert len(failures) == ends.count("S")
 
 
 @pytest.mark.parametrize(("along", "recovery"), [(-1.0, ["back_up"]), (1.0, ["relax"])], ids=["came", "went"])

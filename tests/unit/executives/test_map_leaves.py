@@ -92,6 +92,12 @@ def test_a_path_is_blocked_if_its_next_metres_are_and_that_is_no_failure(run, wo
     assert 0.0 < world.path_length <= 0.5
 
 
+def test_where_the_map_cannot_say_no_path_is_blocked(run, world, make_session):
+    world.states = [TransformError("no frame 'moon'")]
+    result = run(PathBlocked("blocked?", 0.5), path=make_session().path_to(3.0))
+    assert (result.status, result.mission.failure) == (Status.FAILURE, None)
+
+
 def test_without_a_path_nothing_is_blocked(run, world):
     assert run(PathBlocked("blocked?", 0.5)).status == Status.FAILURE
     assert world.asked == []

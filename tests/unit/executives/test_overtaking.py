@@ -1,12 +1,15 @@
 """What a tree that asks who is in its way does behind somebody who goes its way, but slower."""
 
+import math
 from types import SimpleNamespace
 
 import pytest
+from py_trees.common import Status
 
 from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
-from mbf_abstract.geometry import Pose
+from mbf_abstract.executives.trees.overtaking import SIDEWAYS, Overtake, has_room_beside
+from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.maps.tracking.blocking import Blockage
@@ -99,3 +102,29 @@ def test_where_the_map_cannot_say_who_is_on_a_path_none_is_taken(behind, monkeyp
 
     session.server.queries.what_blocks = what_blocks
     assert len(plans_of(session)) == 1
+
+
+def test_room_is_looked_for_along_lines_beside_the_path_to_the_left_and_to_the_right():
+    yaw, asked = 0.6, []
+    ends = [(1.0 + s * math.cos(yaw), 2.0 + s * math.sin(yaw), 0.0) for s in (0.0, 3.0, 6.0, 9.0)]
+
+    def check_path(path):
+        asked.append(path)
+        return SimpleNamespace(state=CellState.LETHAL)
+
+    queries = SimpleNamespace(what_blocks=lambda path, margin: (), check_path=check_path)
+    navigator = SimpleNamespace(server=SimpleNamespace(queries=queries))
+    mission = SimpleNamespace(path_to_follow=lambda: Path.from_points(ends), navigator=navigator)
+
+    assert not has_room_beside(mission, slow_one())
+    aside = [[math.cos(yaw) * (pose.y - 2.0) - math.sin(yaw) * (pose.x - 1.0) for pose in path] for path in asked]
+    assert [round(line[0], 6) for line in aside] == [side * shift for shift in SIDEWAYS for side in (1.0, -1.0)]
+    assert all(line == pytest.approx([line[0]] * len(line)) for line in aside)
+
+
+@pytest.mark.parametrize(("aside", "status"), [(0.0, Status.FAILURE), (0.5, Status.SUCCESS)])
+def test_it_succeeds_if_and_only_if_the_path_past_somebody_is_taken(behind, aside, status):
+    session = behind(slow_one())
+    past = Overtake("path past it", "", 0, math.inf, "")
+    result = TreeExecutive(past, session.navigator).run(Pose.planar(6.0, aside), path=session.path_to(6.0))
+    assert result.status == status

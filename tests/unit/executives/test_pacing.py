@@ -88,6 +88,25 @@ def test_f201_distance_paces_the_child(session, bind, scripted, tick):
     assert counts == [1, 1, 2, 2, 3, 3, 4]
 
 
+def test_exactly_the_distance_is_far_enough(session, bind, scripted, tick):
+    child = scripted("S")
+    tree = bind(EveryDistance("every metre", child, 1.0))
+    for session.robot._x in (0.0, 1.0):
+        session.clock.sleep(0.05)
+        tick(tree)
+    assert child.ticks == 2
+
+
+def test_after_having_been_idle_a_paced_child_starts_at_once(bind, scripted, tick):
+    child = scripted("S")
+    tree = bind(EverySeconds("every minute", child, 60.0))
+    tick(tree, 2)
+    assert child.ticks == 1
+    tree.stop(Status.INVALID)
+    tick(tree, 2)
+    assert child.ticks == 2
+
+
 def test_f202_speed_paces_the_child(session, bind, scripted, tick):
     tree = bind(BySpeed("by speed", scripted("S"), 0.1, 1.0, 0.5))
     tick(tree)

@@ -175,6 +175,16 @@ def test_keepout_polygon_applies_to_its_storey_only():
     assert marked == {(1.0, 1.0, 0.0), (2.0, 1.0, 0.0)}
 
 
+def test_what_lies_on_the_outline_of_a_region_is_closed_with_it():
+    mesh = MeshMap.from_heights(np.zeros((6, 8)), 1.0, 1.0)
+    triangle = ((1.0, 1.0), (7.0, 1.0), (4.0, 4.0))
+
+    layer = computed(mesh, KeepoutLayer, regions=[{"polygon": triangle}])
+
+    x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
+    np.testing.assert_array_equal(layer.lethal, (y >= 1.0) & (y <= x) & (y <= 8.0 - x))
+
+
 def test_labels_give_costs_and_the_last_region_wins():
     mesh = MeshMap.from_heights(np.zeros((5, 5)), 1.0, 1.0)
     everything = ((-1.0, -1.0), (9.0, -1.0), (9.0, 9.0), (-1.0, 9.0))
@@ -184,7 +194,7 @@ def test_labels_give_costs_and_the_last_region_wins():
     layer = computed(mesh, LabelLayer, regions=regions, label_costs={"lawn": 0.3}, lethal_labels=["mud"])
 
     muddy = (mesh.vertices[:, :2] == 0.0).all(axis=1)
-    np.testing.assert_allclose(layer.costs[~muddy], 0.3)
+    np.testing.assert_allclose(layer.costs, np.where(muddy, 1.0, 0.3))
     np.testing.assert_array_equal(layer.lethal, muddy)
 
 

@@ -22,6 +22,14 @@ def test_post_makes_the_corners_of_the_face_below_lethal_and_inflates_them():
     assert (snapshot.costs[near] > 0.0).all()
 
 
+def test_each_face_is_marked_by_what_stands_above_it():
+    for face in (0, 1, -1):
+        mesh = floor_map()
+        corners = mesh.faces[face]
+        see(mesh, post(*mesh.vertices[corners].mean(axis=0)[:2].tolist()), 1.0)
+        assert set(np.flatnonzero(mesh.layers["seen"].lethal)) == set(corners.tolist())
+
+
 def test_snapshot_taken_before_keeps_its_values():
     mesh = floor_map()
     before = mesh.snapshot()

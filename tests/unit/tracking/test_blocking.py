@@ -68,3 +68,14 @@ def test_an_update_reports_a_bounded_number_of_changes_and_the_next_one_the_othe
     crowd = [known(number, motion=Motion.MOVING) for number in range(1, MOST_REPORTS + 6)]
     assert [len(list(changes.changes(crowd))) for _ in range(3)] == [MOST_REPORTS, 5, 0]
     assert [len(list(changes.changes([]))) for _ in range(3)] == [MOST_REPORTS, 5, 0]
+
+
+def test_an_event_names_the_place_the_velocity_and_the_size_of_an_object():
+    walks = known(3, x=4.0, y=-1.0, vx=0.5, vy=0.1, motion=Motion.MOVING, z=0.2)
+    assert walks.to_data() == {
+        "number": 3,
+        "motion": "moving",
+        "position": [4.0, -1.0, 0.2],
+        "velocity": [0.5, 0.1],
+        "radius": 0.25,
+    }

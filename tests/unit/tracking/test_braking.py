@@ -72,6 +72,26 @@ def test_a_robot_that_does_as_commanded_already_takes_up_nothing_at_once(command
     assert len(list(motions_to_standstill(Pose.planar(0.0, 0.0), Twist(), command, 1.0, LIMITS))) == 3
 
 
+@pytest.mark.parametrize("command", [Twist.planar(0.6), Twist.planar(-0.6, wz=0.3), Twist.planar(wz=-0.9)])
+@pytest.mark.parametrize("share", [1.0, 0.5, 0.25])
+def test_on_the_arc_it_brakes_from_the_share_that_it_drives_of_the_command(command, share):
+    """It is never taken to be faster than the command, nor to go back."""
+    brakes = LIMITS.driving / command.speed if command.speed else LIMITS.turning / abs(command.wz)  # shares a second
+    for now in (-0.5, 0.0, 0.4, 1.0, 1.5):
+        measured = Twist.planar(now * command.vx, wz=now * command.wz)
+        times, poses = next(motions_to_standstill(Pose.planar(0.0, 0.0), measured, command, share, LIMITS))
+        pace = max(share, min(max(now, 0.0), 1.0) - 0.3 * brakes)
+        reacting = 0.3 * max(share, 0.5 * (min(max(now, 0.0), 1.0) + pace))
+        assert times[-1] == pytest.approx(0.3 + pace / brakes)
+        assert poses[-1][2] == pytest.approx(command.wz * (reacting + 0.5 * pace * pace / brakes))
+
+
+def test_a_robot_that_stands_and_follows_at_once_is_looked_at_where_it_is():
+    at_once = LIMITS._replace(reaction_time=0.0)
+    for _, poses in motions_to_standstill(Pose.planar(1.0, 2.0, 0.3), Twist(), Twist.planar(0.5), 0.0, at_once):
+        assert poses.tolist() == [[1.0, 2.0, pytest.approx(0.3)]]
+
+
 places = st.floats(-2.0, 2.0)
 
 

@@ -397,3 +397,21 @@ def test_two_scans_of_one_moment_are_both_taken_in_and_an_older_one_is_not():
         late = tracker.insert(disc(-2.0, 1.0), SENSOR, (step - 1) * PERIOD)
         assert not late.any()
     assert [(round(one.x), round(one.y)) for one in tracker.objects(9 * PERIOD)] == [(2, -1), (2, 1)]
+
+
+def test_who_is_forgotten_leaves_every_other_one_there_once():
+    tracker = Tracker(TrackingParameters(), "map")
+    for step in range(25):
+        leaves = [disc(2.0, -1.0)] if step < 10 else []
+        tracker.insert(np.concatenate([*leaves, disc(2.0, 1.0)]), SENSOR, step * PERIOD)
+        numbers = [known.number for known in tracker.objects(step * PERIOD)]
+        assert len(set(numbers)) == len(numbers)
+    assert numbers == [2]
+
+
+def test_asked_for_a_time_before_the_last_scan_everybody_is_where_they_were_seen_last():
+    tracker, now = follow(walk(2.0, -1.0, 0.0, 0.8, 20))
+    (last,), (before,) = tracker.objects(now), tracker.objects(now - 1.0)
+    assert (before.x, before.y) == (last.x, last.y) and before.unseen == 0.0
+    tracker, _ = follow([(2.0, -1.0)] * 5)
+    assert tracker.objects(-1.0)[0].standing == 0.0
