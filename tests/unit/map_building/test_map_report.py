@@ -95,11 +95,11 @@ def test_the_figures_are_those_of_the_surface(scene, tmp_path):
     cloud = read_clouds([write_text(tmp_path / "scene.xyz", scene.points)])
     facts = map_facts(cloud, build_surface(cloud.points))
     by_chance = 16.0 * 12.0 * np.exp(-4.0)  # cells without a point, of four on average
-    assert facts.filled_area == pytest.approx(0.5 + by_chance, abs=0.7)
-    assert facts.obstacle_area == pytest.approx(0.04, abs=0.2)
-    assert facts.small_area == pytest.approx(4.0, abs=1.5)
-    assert facts.area == pytest.approx(16.0 * 12.0, abs=2.0)
-    assert facts.density == pytest.approx(100.0, abs=8.0)
+    assert facts.filled_area == pytest.approx(0.5 + by_chance, abs=0.4)
+    assert facts.obstacle_area == pytest.approx(0.04)
+    assert facts.small_area == pytest.approx(4.0, abs=0.2)
+    assert facts.area == pytest.approx(16.0 * 12.0, abs=0.5)
+    assert facts.density == pytest.approx(100.0)
     distances = scene.distances[np.isfinite(scene.distances)]
     assert facts.error_rms == pytest.approx(float(np.sqrt((distances.astype(float) ** 2).mean())), abs=1e-6)
     assert facts.error_rms <= facts.error_95 <= facts.error_max
