@@ -64,6 +64,11 @@ def test_a_goal_behind_a_gap_too_narrow_for_the_robot_is_a_permanent_failure(mak
     assert plan(make_plugin, planner_class, rooms(gap=3, sensed=False)).permanent
 
 
+def test_limits_of_the_speed_leave_walls_as_permanent_as_they_are(make_plugin, rooms):
+    layers = ("static", "obstacle", "speed_limit", "inflation")
+    assert plan(make_plugin, AStarPlanner, rooms(gap=0, sensed=False, layers=layers)).permanent
+
+
 @pytest.mark.parametrize("planner_class", PLANNERS)
 def test_a_goal_behind_sensed_obstacles_may_become_free(make_plugin, rooms, planner_class):
     result = plan(make_plugin, planner_class, rooms(gap=10, sensed=True))
