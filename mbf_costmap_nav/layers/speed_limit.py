@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.maps.layers.limits import LimitType, lowest
+from mbf_abstract.maps.layers.limits import LimitType, limit_warning, lowest
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.files.map_description import UNKNOWN_OCCUPANCY
 from mbf_costmap_nav.grid.costmap import FREE, CellArray, CellBox, Costmap
@@ -50,8 +50,7 @@ class SpeedLimitLayer(AreaLayer):
         """No limit, or one that is none."""
         if zone.speed_limit is None:
             return "it has no speed_limit, so it does nothing"
-        is_all = self.parameters.limit_type == "percent" and zone.speed_limit >= 100.0
-        return f"a speed_limit of {zone.speed_limit:g} percent is no limit" if is_all else ""
+        return limit_warning(zone.speed_limit, self.parameters.limit_type)
 
     @property
     def permanent(self) -> bool:

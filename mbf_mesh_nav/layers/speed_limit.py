@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.maps.layers.limits import LimitType, lowest
+from mbf_abstract.maps.layers.limits import LimitType, limit_warning, lowest
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.layers.polygon_regions import Region
 from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
@@ -46,9 +46,9 @@ class SpeedLimitLayer(MeshLayer):
         return 0.0
 
     def configuration_warning(self) -> str:
-        """The first region whose polygon is hardly meant as it is."""
+        """The first region whose polygon or limit is hardly meant as it is."""
         for index, region in enumerate(self.parameters.regions):
-            if problem := region.warning():
+            if problem := region.warning() or limit_warning(region.speed_limit, self.parameters.limit_type):
                 return f"{region.title('regions', index)}: {problem}"
         return ""
 

@@ -18,3 +18,9 @@ def lowest(limits: Iterable[float], limit_type: LimitType, full_speed: float) ->
     if limit_type == "percent" and least < math.inf:
         least = least * full_speed / 100.0 if least > 0.0 else 0.0
     return min(full_speed, least)
+
+
+def limit_warning(limit: float, limit_type: LimitType) -> str:
+    """Why a limit in m/s, or in % of the full speed, slows nobody down; empty if it does."""
+    is_all = limit_type == "percent" and limit >= 100.0
+    return f"a speed_limit of {limit:g} percent is no limit" if is_all else ""

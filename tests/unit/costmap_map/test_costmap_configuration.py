@@ -42,6 +42,21 @@ def test_a_keepout_mask_of_another_resolution_raises_costs(build, tmp_path):
     assert (snapshot.cost_at(3.5, 2.5), snapshot.cost_at(4.5, 4.5), snapshot.cost_at(0.5, 0.5)) == (254, 127, 0)
 
 
+@pytest.mark.parametrize(
+    ("limit", "limit_type", "warning"),
+    [
+        (None, "absolute", "it has no speed_limit, so it does nothing"),
+        (100.0, "percent", "a speed_limit of 100 percent is no limit"),
+        (99.0, "percent", ""),
+        (100.0, "absolute", ""),
+    ],
+)
+def test_a_zone_that_slows_nobody_down_is_noted(build, limit, limit_type, warning):
+    block = {"zones": [ZONE | {"speed_limit": limit}], "limit_type": limit_type}
+    noted = build("speed_limit", speed_limit=block).layers["speed_limit"].configuration_warning()
+    assert noted.endswith(warning) and bool(noted) == bool(warning)
+
+
 def test_speed_limits_come_from_zones_and_masks(build, tmp_path):
     occupancy = np.full((10, 10), 0, dtype=np.uint8)
     occupancy[8, 8] = 75

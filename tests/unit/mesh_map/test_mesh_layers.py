@@ -15,6 +15,7 @@ from mbf_mesh_nav.layers.keepout import KeepoutLayer
 from mbf_mesh_nav.layers.label import LabelLayer
 from mbf_mesh_nav.layers.ridge import RidgeLayer
 from mbf_mesh_nav.layers.roughness import RoughnessLayer
+from mbf_mesh_nav.layers.speed_limit import SpeedLimitLayer
 from mbf_mesh_nav.layers.steepness import SteepnessLayer
 from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.map.mesh_map import MeshMap
@@ -183,6 +184,15 @@ def test_what_lies_on_the_outline_of_a_region_is_closed_with_it():
 
     x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
     np.testing.assert_array_equal(layer.lethal, (y >= 1.0) & (y <= x) & (y <= 8.0 - x))
+
+
+@pytest.mark.parametrize(("limit", "limit_type"), [(100.0, "percent"), (99.0, "percent"), (100.0, "absolute")])
+def test_a_region_that_slows_nobody_down_is_noted(limit, limit_type):
+    mesh = MeshMap.from_heights(np.zeros((5, 5)), 1.0, 1.0)
+    region = {"polygon": ((0.5, 0.5), (2.5, 0.5), (2.5, 1.5)), "speed_limit": limit}
+    noted = computed(mesh, SpeedLimitLayer, regions=[region], limit_type=limit_type).configuration_warning()
+    assert noted.endswith("a speed_limit of 100 percent is no limit") == bool(noted)
+    assert bool(noted) == (limit_type == "percent" and limit == 100.0)
 
 
 def test_labels_give_costs_and_the_last_region_wins():
