@@ -268,3 +268,14 @@ def test_sources_follow_the_flags_and_costs_of_changed_vertices_only():
     assert flipped.dtype == np.int32
     assert np.array_equal(known_lethal, expected_lethal)
     assert np.array_equal(is_source, expected_source)
+
+
+@pytest.mark.parametrize(
+    ("factor", "robot", "inscribed"), [(0.5, 0.2, 0.2), (0.9, 0.2, 0.27), (0.5, 0.4, 0.3), (0.5, 0.0, 0.3)]
+)
+def test_relaxed_its_inner_circle_shrinks_to_that_of_the_robot_at_most(factor, robot, inscribed):
+    usual = InflationParameters(inscribed_radius=0.3, inflation_radius=0.8, cost_scaling_factor=3.0)
+    relaxed = usual.relaxed(factor, robot)
+    assert relaxed.inscribed_radius == pytest.approx(inscribed)
+    assert relaxed.inflation_radius == pytest.approx(max(0.8 * factor, inscribed))
+    assert relaxed.cost_scaling_factor == pytest.approx(3.0 / factor)

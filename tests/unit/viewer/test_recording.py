@@ -6,6 +6,8 @@ import math
 import numpy as np
 import pytest
 
+from mbf_abstract.event_bus import EventBus
+from mbf_abstract.event_sinks import MemorySink
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.maps.served_map import ServedMap
@@ -17,7 +19,7 @@ from terrain.recording.recorded_objects import AGE, IS_MOVING, NUMBER, VX, X, Y
 from terrain.recording.recorded_robot import RobotShape
 from terrain.recording.recorder import MAP_PERIOD, MAX_GRID_CELLS, MAX_MESH_VERTICES, OBJECTS_PERIOD, Recorder
 from terrain.recording.recording import Recording, RecordingError
-from terrain.recording.run_folder import PARTS, read_parts
+from terrain.recording.run_folder import PARTS, RecordingParts, read_parts
 from terrain.recording.verdict import Verdict
 from terrain.scenarios.scenario import load_scenario
 from terrain.session.session import Session, SessionOptions
@@ -259,3 +261,14 @@ def test_events_of_a_real_clock_are_brought_to_the_time_of_the_samples():
 
     assert [event.time for event in recording.events] == [0.0, 0.25, 4.75]
     assert [event.data["number"] for event in recording.events] == [0, 1, 2]
+
+
+def test_parts_that_cannot_be_written_are_reported_once_and_the_run_goes_on(tmp_path):
+    memory = MemorySink()
+    events = EventBus(lambda: 0.0, [memory])
+    parts = RecordingParts(tmp_path / "removed", None, events, (), lambda: 0.0)
+    for time in (0.0, 3.0, 6.0):
+        parts.after_step(time)
+    parts.end()
+    (failed,) = memory.of_kind(EventKind.SINK_FAILED)
+    assert failed.data["sink"] == PARTS and "FileNotFoundError" in failed.data["message"]

@@ -166,6 +166,14 @@ def test_a_replay_shows_each_frame_where_the_robot_was(hill_recording, contents_
     np.testing.assert_array_equal(arrays[scene["world"]["levels"][0][1]], hill_recording.ground.faces)
 
 
+def test_the_first_view_of_a_replay_has_the_way_to_the_goal_from_left_to_right(hill_recording, contents_of):
+    scene, _ = contents_of(replay_html(hill_recording))
+
+    start, goal = hill_recording.start, hill_recording.goals[-1]
+    looks = scene["route"]["yaw"] + math.pi / 2.0, math.atan2(goal.y - start.y, goal.x - start.x)
+    assert math.remainder(looks[0] - looks[1], math.tau) == pytest.approx(0.0, abs=1e-6), looks
+
+
 def test_a_run_that_never_began_has_a_replay_too(contents_of):
     run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(Verdict(100, "no robot"))
 
