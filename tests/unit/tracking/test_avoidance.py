@@ -97,6 +97,20 @@ def test_motions_cost_what_the_naive_twin_finds(objects, velocities, yaw, step):
             assert one == touched or close
 
 
+@pytest.mark.parametrize(
+    ("box", "towards"),
+    [(RobotBox(-0.1, 1.2, -0.2, 0.2, 0.0), (1.0, 0.0)), (RobotBox(-0.2, 0.2, -0.1, 1.2, 0.0), (0.0, 1.0))],
+    ids=["long", "wide"],
+)
+def test_an_outline_that_reaches_far_to_one_side_meets_who_is_there(box, towards):
+    stands_there = person(1.75 * towards[0], 1.75 * towards[1])
+    motion = [(0.02 * step * towards[0], 0.02 * step * towards[1], 0.0) for step in range(1, 21)]
+    cost, touched = naive(motion, [stands_there], box, HERE, LIMITS, STEP)
+    found = met([motion], stands_there, box=box)
+    assert cost > 1.0 and touched == 0
+    assert (found.costs[0], found.touched[0]) == (pytest.approx(cost, abs=1e-4), touched)
+
+
 def _least_gap(motion, objects, box, pose, step):
     """Least distance [m] of any gap, that of the standing robot included, from contact: rounding decides below."""
     least = math.inf
