@@ -16,7 +16,7 @@ from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.colours import BAD, GOOD, WARNING
 from terrain.viewer.pictures.incident_marks import OTHER, mark_of
 from terrain.viewer.replay.replay_page import replay_html
-from terrain.viewer.replay.run_panel import MAX_MARKS, legend_of, panel_html
+from terrain.viewer.replay.run_panel import MAX_MARKS, Entry, legend_html, legend_of, panel_html
 from terrain.viewer.reports.tree_html import worth_showing
 
 WELL = Verdict(0, "goal reached")
@@ -135,6 +135,14 @@ def test_idle_nodes_are_shown_below_a_running_one_only():
     assert [node.name for node in worth_showing(nodes)] == [
         "root", "done", "failed below done", "waits", "works", "next"
     ]  # fmt: skip
+
+
+def test_the_legend_shows_each_mark_as_it_is_drawn():
+    box, line, dash = (legend_html([Entry("<name>", (1, 2, 3), mark)]) for mark in ("box", "line", "dash"))
+    assert "background:rgb(1,2,3)" in box and "<svg>" not in box
+    assert 'stroke="rgb(1,2,3)" stroke-width="3"/>' in line
+    assert 'stroke="rgb(1,2,3)" stroke-width="6" stroke-dasharray="8 4"/>' in dash
+    assert all("<span>&lt;name&gt;</span>" in shown for shown in (box, line, dash))
 
 
 def test_the_legend_names_what_occurs_in_the_run_and_nothing_else(hill_recording, office_recording):
