@@ -37,7 +37,7 @@ from mbf_mesh_nav.mesh.positions import position_text, vector_of
 from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, tracker_on_surface
 from mbf_mesh_nav.motion.path_ahead import path_ahead
 from mbf_mesh_nav.motion.sampled_motions import MPPIParameters, SampledMotions, critics, pieces_of_a_step
-from mbf_mesh_nav.motion.surface_follower import SamplingFollower
+from mbf_mesh_nav.motion.surface_follower import KeepingFollower
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.search.final_approach import with_final_approach, with_first_turn
 
@@ -49,7 +49,7 @@ _STANDSTILL = 0.2  # [m] and [rad] gained over the horizon: less than this is no
 _IDLE_CYCLES = 20  # without motion, after which there is none that gets on
 
 
-class MPPIController(SamplingFollower):
+class MPPIController(KeepingFollower):
     """Sampling controller that avoids what the map shows now."""
 
     Parameters = MPPIParameters

@@ -28,7 +28,8 @@ from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.map.places import FORBIDDEN_COST
 from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, tracker_on_surface
-from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, SurfaceFollower
+from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, KeepingFollower
+from mbf_mesh_nav.plugins import MeshContext
 
 SHARES = (1.0, 0.5, 0.25)
 """Shares of the look-ahead that are tried where the arc to a point farther ahead cuts a corner that is not free."""
@@ -75,12 +76,21 @@ class PathFollowerParameters(InertiaParameters):
     )
 
 
-class PathFollower(LeavesContacts, BrakesOnItsArc, SurfaceFollower):
+class PathFollower(LeavesContacts, BrakesOnItsArc, KeepingFollower):
     """Pure pursuit on the surface."""
 
     Parameters = PathFollowerParameters
     parameters: PathFollowerParameters
     _measured = Twist()
+
+    def __init__(self, context: MeshContext) -> None:
+        super().__init__(context)
+        self.parameters_changed()
+
+    def parameters_changed(self) -> None:
+        """Take over new limits."""
+        p = self.parameters
+        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, p, p, allow_reversing=False)
 
     @classmethod
     def reach(cls, parameters: PathFollowerParameters) -> float:
@@ -104,6 +114,7 @@ class PathFollower(LeavesContacts, BrakesOnItsArc, SurfaceFollower):
             return self.refuse(why)
         self._tracker = tracker_on_surface(self.mesh_map, path, self.parameters.max_surface_distance)
         self._approach = GoalApproach(path[-1], self.parameters.goal_distance)
+        self._keeping.set_plan(path)
         return True
 
     def free_motion(self, request: ControlRequest) -> ControlResult:
@@ -125,7 +136,9 @@ class PathFollower(LeavesContacts, BrakesOnItsArc, SurfaceFollower):
         if obstacle := self._obstacle_on_path(surface.point):
             return blocked_path(self.mesh_map, pose, obstacle)
         slope = math.acos(clamp(float(self.mesh_map.face_normals[surface.face, 2]), 1.0))
-        return self._pursue(pose, slope)
+        slope_factor = 1.0 - (1.0 - self.parameters.slope_speed_factor) * min(slope / self.parameters.slow_slope, 1.0)
+        fastest = slope_factor * self.parameters.max_vel_x
+        return self.closely(request, fastest) or self._pursue(request, fastest)
 
     def _obstacle_on_path(self, here: FloatArray) -> str:
         """The first place on the path that the map forbids now, as a text; empty without one in reach."""
@@ -149,24 +162,34 @@ class PathFollower(LeavesContacts, BrakesOnItsArc, SurfaceFollower):
         tracker, ahead = self._tracker, share * self.parameters.look_ahead_dist
         return tracker.point_at(tracker.progress + ahead) if tracker.on_last_section else tracker.straight_on(ahead)
 
-    def _pursue(self, pose: Pose, slope: float) -> ControlResult:
-        """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""
-        p, tracker = self.parameters, self._tracker
+    def _pursue(self, request: ControlRequest, fastest: float) -> ControlResult:
+        """Drive the arc that is tangent to the robot's heading and passes through the point ahead, or turn to that.
+
+        Where the way to it is not free it is a nearer one; a point may lie behind a corner. A robot that states no
+        inertia turns to any, and drives to the nearest.
+        """
+        p, pose, obstacle = self.parameters, request.pose, ""
         for share in SHARES:
             target = self._target(share)
             bearing, curvature = arc_to(pose, target)
-            if abs(bearing) > p.rotate_to_heading_min_angle:
-                return self._command(0.0, self._turn(bearing).wz)
-            if share == SHARES[-1] or self._is_free(pose, target, bearing, curvature):
-                break
-        slope_factor = 1.0 - (1.0 - p.slope_speed_factor) * min(slope / p.slow_slope, 1.0)
+            turns = abs(bearing) > p.rotate_to_heading_min_angle
+            wanted = self._turn(bearing) if turns else self._arc(pose, target, curvature, fastest, share)
+            command, anyway = self._reachable(wanted), p.acc_lim_x == math.inf and (turns or share == SHARES[-1])
+            obstacle = self._obstacle_to(pose, target, bearing, 0.0 if turns else curvature, command)
+            if anyway or not obstacle:
+                return ControlResult(ExePathOutcome.SUCCESS, "", command)
+        return self.closely(request, fastest, is_stuck=True) or blocked_path(self.mesh_map, pose, obstacle)
+
+    def _arc(self, pose: Pose, target: FloatArray, curvature: float, fastest: float, share: float) -> Twist:
+        """The motion on an arc to a target, as fast as the robot may be there."""
+        p, tracker = self.parameters, self._tracker
         # A robot that ran past the goal has no path left, but still a distance to drive back; the height of its frame
         # above the surface does not count.
         left = tracker.to_cusp
         if tracker.on_last_section:
             left = max(left, math.hypot(*in_robot_frame(pose, target)[:2]))
         speed = min(
-            p.max_vel_x * slope_factor,
+            fastest,
             math.sqrt(p.max_lateral_acceleration / max(abs(curvature), 1e-6)),
             p.max_vel_theta / max(abs(curvature), 1e-6),
             stopping_speed(left, min(p.decel_lim_x, PLANNED * p.acc_lim_x), p.reaction_time),
@@ -174,22 +197,36 @@ class PathFollower(LeavesContacts, BrakesOnItsArc, SurfaceFollower):
             share * p.look_ahead_dist / CLOSELY if share < 1.0 else math.inf,
         )
         speed = max(speed, min(p.min_speed, p.max_vel_theta / max(abs(curvature), 1e-6)))
-        return self._command(speed, speed * curvature)
+        return Twist.planar(speed, wz=speed * curvature)
 
-    def _is_free(self, pose: Pose, target: FloatArray, bearing: float, curvature: float) -> bool:
-        """Whether the map allows all of the arc to a target, which cuts the corners of the path."""
+    def _obstacle_to(self, pose: Pose, target: FloatArray, bearing: float, curvature: float, command: Twist) -> str:
+        """What forbids the way to a target, or the arc of a command until the robot has stopped on it."""
         p = self.parameters
         if p.check_ahead_dist == 0.0:
-            return True
+            return ""
         length = float(norm(target - np.asarray(pose.position)))
-        length *= bearing / math.sin(bearing) if bearing != 0.0 else 1.0
-        times = np.linspace(0.0, length, max(math.ceil(length / ARC_STEP), 1) + 1)[1:]
+        if curvature != 0.0:  # an arc, which cuts the corners of the path; else the straight line
+            length, bearing = length * bearing / math.sin(bearing), 0.0
+        obstacle, rolls_on = (
+            self._obstacle_within(pose, length, bearing, curvature),
+            command.vx * p.time_on_arc(command),
+        )
+        if obstacle or rolls_on <= 0.0:
+            return obstacle
+        return self._obstacle_within(pose, rolls_on, 0.0, command.wz / command.vx)
+
+    def _obstacle_within(self, pose: Pose, length: float, bearing: float, curvature: float) -> str:
+        """The first place that the map forbids on an arc of a length [m] that begins at a bearing [rad]; "" if none."""
+        p, times = self.parameters, np.linspace(0.0, length, max(math.ceil(length / ARC_STEP), 1) + 1)[1:]
         local = np.zeros((len(times) + 1, 3))
-        local[1:, :2] = poses_on_arc((0.0, 0.0, 0.0), 1.0, 0.0, curvature, times)[:, :2]
+        local[1:, :2] = poses_on_arc((0.0, 0.0, bearing), 1.0, 0.0, curvature, times)[:, :2]
         places = rotated(pose.rotation, local) + np.asarray(pose.position)
-        return not self.obstacle_along(places, p.max_surface_distance, p.cost_limit)
+        return self.obstacle_along(places, p.max_surface_distance, p.cost_limit)
 
     def _command(self, speed: float, turn: float) -> ControlResult:
+        return ControlResult(ExePathOutcome.SUCCESS, "", self._reachable(Twist.planar(vx=speed, wz=turn)))
+
+    def _reachable(self, motion: Twist) -> Twist:
         p = self.parameters
-        command = Twist.planar(vx=speed, wz=clamp(turn, p.max_vel_theta))
-        return ControlResult(ExePathOutcome.SUCCESS, "", p.reachable(command, self._measured, p.max_vel_theta))
+        command = Twist.planar(vx=motion.vx, wz=clamp(motion.wz, p.max_vel_theta))
+        return p.reachable(command, self._measured, p.max_vel_theta)

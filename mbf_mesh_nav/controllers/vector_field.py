@@ -27,8 +27,9 @@ from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, tracker_on_surface
-from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, SurfaceFollower
+from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, KeepingFollower
 from mbf_mesh_nav.motion.vector_field import VectorField
+from mbf_mesh_nav.plugins import MeshContext
 
 STRAYING = 2.0
 """The field leads to the goal from anywhere, not back to the path: a robot off the path comes to its end otherwise."""
@@ -66,7 +67,7 @@ class VectorFieldParameters(InertiaParameters):
     )
 
 
-class VectorFieldController(BrakesOnItsArc, SurfaceFollower):
+class VectorFieldController(BrakesOnItsArc, KeepingFollower):
     """Follows the field of the plan it executes."""
 
     Parameters = VectorFieldParameters
@@ -74,6 +75,15 @@ class VectorFieldController(BrakesOnItsArc, SurfaceFollower):
 
     _face = -1
     _measured = Twist()
+
+    def __init__(self, context: MeshContext) -> None:
+        super().__init__(context)
+        self.parameters_changed()
+
+    def parameters_changed(self) -> None:
+        """Take over new limits."""
+        p = self.parameters
+        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, p, p, allow_reversing=False)
 
     @property
     def inertia(self) -> InertiaParameters:
@@ -98,6 +108,7 @@ class VectorFieldController(BrakesOnItsArc, SurfaceFollower):
         self._tracker = tracker_on_surface(self.mesh_map, self._last_leg(path), self.parameters.max_surface_distance)
         self._approach = GoalApproach(path[-1], self.parameters.goal_distance, STRAYING)
         self._leg, self._face = 0, -1
+        self._keeping.set_plan(path)
         return True
 
     def free_motion(self, request: ControlRequest) -> ControlResult:
@@ -114,7 +125,10 @@ class VectorFieldController(BrakesOnItsArc, SurfaceFollower):
         direction = self._fields[self._leg].direction_at(self.mesh_map, spot)
         if direction is None:
             return ControlResult(ExePathOutcome.MISSED_PATH, "the vector field does not lead on from here")
-        p, places = self.parameters, self._places_ahead(spot)
+        p = self.parameters
+        if (closely := self.closely(request, p.max_vel_x)) is not None:
+            return closely
+        places = self._places_ahead(spot)
         if obstacle := self.obstacle_along(places, p.max_surface_distance, p.cost_limit):
             return blocked_path(self.mesh_map, pose, obstacle)
         ahead = rotated_back(pose.rotation, direction)
@@ -125,6 +139,7 @@ class VectorFieldController(BrakesOnItsArc, SurfaceFollower):
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the last leg has been driven to its end, and the last pose of the plan is reached."""
         if self._approach is None or not self._on_last_leg:
+            self._keeping.update(pose, dist_tolerance, angle_tolerance)
             return False
         return super().is_goal_reached(pose, dist_tolerance, angle_tolerance)
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.maps.controllers.failures import no_path, obstacle_text, outside_map
 from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath
-from mbf_abstract.plugins import ControlResult
+from mbf_abstract.maps.controllers.motion_limits import MotionLimits
+from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter
 from mbf_mesh_nav.mesh.borders import beyond_border
@@ -68,12 +72,22 @@ class SurfaceFollower(MeshController):
         return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
 
 
-class SamplingFollower(SurfaceFollower):
-    """One that samples motions, and keeps to its path where they get the robot nowhere."""
+class KeepingFollower(SurfaceFollower):
+    """One that drives closely along its path where its own motions get the robot nowhere, or where it is tight."""
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
         self._keeping = KeepingToPath(context)
+
+    def closely(self, request: ControlRequest, fastest: float, *, is_stuck: bool = False) -> ControlResult | None:
+        """The motion that keeps to the path where that is to be, see ``KeepingToPath``, at most ``fastest`` [m/s].
+
+        It is asked for robots that state their inertia; others drive as before, bit for bit.
+        """
+        p: Any = self.parameters
+        if p.acc_lim_x == math.inf:
+            return None
+        return self._keeping.closely(request, MotionLimits(0.0, fastest, p.max_vel_theta), is_stuck=is_stuck)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """As for all; whoever keeps to the path needs the tolerances, too."""

@@ -64,8 +64,10 @@ OTHER_ROBOTS = (
     ("costmap", "astar", "dwa", 2010), ("costmap", "straight_line", "dwa", 2018),
     ("mesh", "cvp", "vector_field", 2007), ("mesh", "repairing", "path_follower", 2007),
     ("mesh", "heading_astar", "mppi", 2007), ("mesh", "cvp", "follow_path", 2018),
+    ("mesh", "cvp", "path_follower", 2148), ("mesh", "dijkstra", "path_follower", 2167),
+    ("mesh", "cvp", "vector_field", 2157),
 )  # fmt: skip
-"""Robots with other outlines, inertia, rates of control and delays that touched something."""
+"""Robots with other outlines, inertia, rates of control and delays that touched something, or were refused."""
 THROUGH_GAPS = [
     *((name, width) for name in ("dwa", "mppi", "rotation_shim", "follow_path") for width in (0.55, 0.6)),
     *(("regulated_pure_pursuit", width) for width in (0.55, 0.6)),

@@ -109,6 +109,19 @@ class KeepingToPath:
             self.car.is_goal_reached(pose, dist_tolerance, angle_tolerance)
         return reached and self._follower.ended_early
 
+    def closely(self, request: ControlRequest, limits: MotionLimits, *, is_stuck: bool = False) -> ControlResult | None:
+        """The answer that keeps to the path before a tight place; None where there is none, or it is blocked.
+
+        A controller ``is_stuck`` whose own motion is not free; then it keeps to the path until it has come away.
+        """
+        is_tight = self._follower.to_tight_place(request.pose, request.velocity.vx) < math.inf
+        if not (self._has_stood(request.pose, is_stuck) or is_tight):
+            return None
+        answer = self._follower.free_motion(request)
+        if not answer.success or not isinstance(answer.command, Twist):
+            return None
+        return replace(answer, command=limits.hold(answer.command, request.velocity))
+
     def out_of_contact(self, request: ControlRequest, limits: MotionLimits) -> ControlResult | None:
         """The answer that leads straight out of what the robot touches; None for a car, and where there is none."""
         out = self._follower.drive_out(request.pose) if limits.leaves_contacts and not limits.is_car else None
