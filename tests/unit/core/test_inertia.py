@@ -160,6 +160,14 @@ def test_a_refusal_is_braking_along_the_last_arc_until_the_robot_stands():
     assert answer == refused()
 
 
+def test_the_arc_is_that_of_the_command_however_the_robot_is_measured_to_turn():
+    """It was looked at; what is measured only says how much of it is still driven."""
+    last_arc = LastFreeArc()
+    last_arc.keep(Twist.planar(0.4, wz=0.2))
+    answer = last_arc.answer(refused(), Twist.planar(0.36, wz=-0.5), SLOW)
+    assert planar(answer.command) == pytest.approx(planar(Twist.planar(0.31, wz=0.155)))
+
+
 def test_it_ends_even_where_the_robot_is_measured_to_go_on():
     last_arc, cycles = LastFreeArc(), 0
     last_arc.keep(Twist.planar(0.4))
