@@ -181,6 +181,11 @@ class PlanResult(PluginResult):
 class AbstractPlanner(Plugin):
     """Finds a path from a start to a goal pose."""
 
+    @property
+    def avoided_share(self) -> float:
+        """From which share of an obstacle's cost on ground is an obstacle for it; 1 = obstacles alone are."""
+        return 1.0
+
     @abstractmethod
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Find a path; must poll ``request.cancel_token`` and return CANCELED (51) soon after it is set."""

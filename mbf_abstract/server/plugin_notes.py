@@ -10,7 +10,8 @@ from mbf_abstract.config.implausible import implausible_values
 from mbf_abstract.event_bus import EventBus
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.execution.runtime import Runtime
-from mbf_abstract.plugins import PluginKind
+from mbf_abstract.maps.map_plugin import MapPlugin
+from mbf_abstract.plugins import AbstractPlanner, PluginKind
 from mbf_abstract.server.plugin_table import PluginTable
 
 
@@ -56,6 +57,7 @@ def notes_on_numbers(config: Config, plugins: PluginTable, runtime: Runtime) -> 
 def notes_on_plugins(plugins: PluginTable, runtime: Runtime, car_controllers: Sequence[str]) -> Iterator[str]:
     """Yield a note for every setting that can not work as it is; the controllers are those of the map for cars."""
     yield from _curve_notes(plugins, runtime.gate.limits.min_turning_radius, car_controllers)
+    yield from _prediction_notes(plugins)
     yield from _right_of_way_notes(plugins, runtime)
 
 
@@ -71,6 +73,23 @@ def _curve_notes(plugins: PluginTable, tightest: float, car_controllers: Sequenc
                 suited = f"; {' or '.join(car_controllers)} suits it" if car_controllers else ""
                 spot = f"{name} turns on the spot, which the robot cannot"
                 yield f"{spot}: its tightest curve is {tightest:.2f} m{suited}"
+
+
+def _prediction_notes(plugins: PluginTable) -> Iterator[str]:
+    """Planners for which it is an obstacle where somebody will be: they plan far around who is gone by then."""
+    for plugin in plugins.all_of(PluginKind.PLANNER):
+        planner = plugin.instance
+        if not isinstance(planner, AbstractPlanner) or not isinstance(planner, MapPlugin):
+            continue
+        share = planner.avoided_share
+        for name, layer in planner.navigation_map.layers.items():
+            cost = getattr(layer.parameters, "prediction_cost", 0.0)
+            if cost >= share:
+                yield (
+                    f"planner {plugin.name!r}: what costs {share:.2g} of an obstacle is one for it, and layer {name!r} "
+                    f"has prediction_cost {cost:g}: it plans no path through where somebody will be, however long the "
+                    "way around; a prediction_cost below that lets it"
+                )
 
 
 def _right_of_way_notes(plugins: PluginTable, runtime: Runtime) -> Iterator[str]:

@@ -67,6 +67,11 @@ class GridPlanner(CostmapPlanner):
         self._workspace = SearchWorkspace()
 
     @property
+    def avoided_share(self) -> float:
+        """Its ``lethal_cost`` over the highest cost of a cell that is no obstacle."""
+        return self.parameters.lethal_cost / (INSCRIBED - 1)
+
+    @property
     def pose_spacing(self) -> float:
         """Largest distance [m] of two poses of the path; 0 = as the search gives them."""
         return 0.0

@@ -28,6 +28,7 @@ from mbf_mesh_nav.arrays import BoolArray, Float32Array
 from mbf_mesh_nav.kernels.motion.path_poses import poses_along
 from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.map.ground import ground_heights, heights_text
+from mbf_mesh_nav.map.places import FORBIDDEN_COST
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.borders import on_surface
 from mbf_mesh_nav.mesh.locate import SurfacePoint
@@ -66,6 +67,11 @@ class SurfacePlanner(MeshPlanner):
 
     knows_headings: ClassVar[bool] = False
     """Whether the search itself keeps to the headings a tilt layer allows."""
+
+    @property
+    def avoided_share(self) -> float:
+        """Its ``cost_limit`` over the cost of an obstacle."""
+        return self.parameters.cost_limit / FORBIDDEN_COST
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
