@@ -179,7 +179,8 @@ def _coarse(mesh_map: MeshMap) -> Iterator[Finding]:
         if 0.0 < limit < mean_edge:
             text = (
                 f"edges are {mean_edge:.3g} m long on average, more than {what} ({limit:.3g} m); "
-                "layers may miss obstacles and ledges; densify helps those that look around, a finer survey all"
+                "layers may miss obstacles and ledges; densify helps those that look around, a finer survey all; "
+                "an inscribed_radius half an edge larger than the robot's keeps it off what lies between vertices"
             )
             everywhere = np.flatnonzero(np.diff(mesh_map.neighbour_offsets) > 0)
             yield Finding("coarse", text, everywhere, harmless=True)
