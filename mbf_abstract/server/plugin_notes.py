@@ -87,8 +87,8 @@ def _prediction_notes(plugins: PluginTable) -> Iterator[str]:
             if cost >= share:
                 yield (
                     f"planner {plugin.name!r}: what costs {share:.2g} of an obstacle is one for it, and layer {name!r} "
-                    f"has prediction_cost {cost:g}: it plans no path through where somebody will be, however long another "
-                    "one is; a prediction_cost below that lets it"
+                    f"has prediction_cost {cost:g}: it plans no path through where somebody will be, however long "
+                    "another one is; a prediction_cost below that lets it"
                 )
 
 
