@@ -13,7 +13,6 @@ Example
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from contextlib import ExitStack
 from typing import TypeVar
 
 from mbf_abstract.config.configuration import Config
@@ -68,7 +67,7 @@ class NavigationSession:
         self.events = EventBus(self.clock.now, [self.memory, *sinks])
         self.sensor_mounts: dict[str, Transform] = {}
         self.on_initial_pose: list[Callable[[Pose], None]] = []
-        self._closing = ExitStack()
+        self._calls_at_close: list[Callable[[], object]] = []
         self.on_close(self.events.close)
         self.on_close(self._let_threads_end)
 
@@ -113,11 +112,19 @@ class NavigationSession:
 
     def on_close(self, call: Callable[[], object]) -> None:
         """Let the session end with this call; what was made last ends first."""
-        self._closing.callback(call)
+        self._calls_at_close.append(call)
 
     def close(self) -> None:
-        """Stop the robot, close the server and let the threads end; once."""
-        self._closing.close()
+        """Stop the robot, close the server and let the threads end; once.
+
+        Whatever a call raises, those after it are made; the last error has the ones before as its context. An
+        ``ExitStack`` loses that: a Ctrl-C was an error about the lock that it had left.
+        """
+        if self._calls_at_close:
+            try:
+                self._calls_at_close.pop()()
+            finally:
+                self.close()
 
     def _let_threads_end(self) -> None:
         if isinstance(self.clock, SimClock):

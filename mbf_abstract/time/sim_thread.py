@@ -52,8 +52,8 @@ class SimThread:
         self._me = Participant(name, priority)
         self._target = target
         thread = threading.Thread(target=self._run, name=name, daemon=True)
+        thread.start()  # before it is known: the lockstep would wait for one that a Ctrl-C keeps from starting
         scheduler.add(self._me)
-        thread.start()
 
     @property
     def name(self) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.commands.reporting import readable_errors
+from mbf_abstract.session import NavigationSession
 from mbf_mesh_nav.kernels.mesh.incidence import faces_of_vertices
 
 AT_IMPORT = """
@@ -73,6 +74,25 @@ def test_an_interrupt_while_a_kernel_runs_is_no_error_of_the_kernel(default_hand
         while True:
             faces_of_vertices(faces, faces.size)
     thread.join()
+
+
+def test_an_interrupt_of_a_closing_session_is_one_although_what_closes_next_raises():
+    """Such as `release unlocked lock`, by what the interrupt has left halfway."""
+    session, closed = NavigationSession(), []
+
+    def interrupted():
+        raise KeyboardInterrupt
+
+    def left_halfway():
+        raise RuntimeError("release unlocked lock")
+
+    for call in (lambda: closed.append("the rest"), left_halfway, interrupted):
+        session.on_close(call)
+    with pytest.raises(KeyboardInterrupt), readable_errors():
+        session.close()
+    assert closed == ["the rest"]
+    session.close()
+    assert closed == ["the rest"]
 
 
 def test_a_worker_that_is_interrupted_while_it_starts_ends_without_a_word(tmp_path):

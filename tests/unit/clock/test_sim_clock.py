@@ -16,6 +16,20 @@ def test_time_jumps_to_the_earliest_wake_up():
     assert clock.now() == 1000.0
 
 
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), RuntimeError("can't start new thread")])
+def test_time_goes_on_after_a_thread_that_could_not_be_started(monkeypatch, error):
+    def fail(thread):
+        raise error
+
+    clock = SimClock()
+    with monkeypatch.context() as patch, pytest.raises(type(error)):
+        patch.setattr(threading.Thread, "start", fail)
+        clock.spawn(lambda: None, "worker")
+    assert clock.thread_names == ["main"]
+    clock.sleep(1.0)
+    assert clock.now() == 1.0
+
+
 def test_time_stands_still_while_somebody_runs():
     clock = SimClock()
     before = clock.now()
