@@ -19,6 +19,7 @@ from pathlib import Path
 from mbf_abstract.config.findings import suggest
 from mbf_abstract.config.installed_plugins import GROUPS, PluginEntry, entry_of, origin_of, points_of
 from mbf_abstract.event_values import error_text
+from mbf_abstract.parameters import ParameterModel, PluginParameters
 from mbf_abstract.plugins import PLUGIN_BASES, PluginKind
 
 Adapter = Callable[[str, type], type | None]
@@ -179,7 +180,7 @@ class PluginRegistry:
         if issubclass(plugin_class, expected):
             if missing := sorted(getattr(plugin_class, "__abstractmethods__", ())):
                 raise PluginError(group, type_name, f"does not implement {', '.join(missing)}")
-            if reason := self._misfit(plugin_class):
+            if reason := self._misfit(plugin_class) or _wrong_parameters(plugin_class):
                 raise PluginError(group, type_name, reason)
             return plugin_class
         for adapter in self.adapters:
@@ -202,6 +203,14 @@ _BASES: dict[str, type] = {kind.value: base for kind, base in PLUGIN_BASES.items
 
 def _group(group: PluginKind | str) -> str:
     return group.value if isinstance(group, PluginKind) else group
+
+
+def _wrong_parameters(plugin_class: type) -> str:
+    """What is wrong with the class that holds a plugin's parameters, if it has one; empty if nothing is."""
+    model: object = getattr(plugin_class, "Parameters", PluginParameters)
+    if isinstance(model, type) and issubclass(model, ParameterModel):
+        return ""
+    return f"its Parameters is {model!r}, expected a class that derives PluginParameters"
 
 
 def import_problem(error: BaseException) -> str:

@@ -16,6 +16,10 @@ class Planner(AbstractPlanner):
         return PlanResult(0)
 class Unfinished(AbstractPlanner):
     pass
+class Plain:
+    speed = 1.0
+class OddParameters(Planner):
+    Parameters = Plain
 class NavCorePlanner:
     pass
 function = len
@@ -134,6 +138,10 @@ def test_two_distributions_with_one_name_are_a_clash(installed, plugin_module):
         ("broken_plugin_module:Planner", "import failed: RuntimeError: no driver"),
         ("plugin_module_under_test:Missing", "import failed: AttributeError"),
         ("plugin_module_under_test:Unfinished", "does not implement make_plan"),
+        (
+            "plugin_module_under_test:OddParameters",
+            "its Parameters is <class 'plugin_module_under_test.Plain'>, expected",
+        ),
         ("plugin_module_under_test:NavCorePlanner", "class NavCorePlanner is no AbstractPlanner"),
         ("plugin_module_under_test:function", "is not a class but a builtin_function_or_method"),
     ],
