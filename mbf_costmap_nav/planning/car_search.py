@@ -153,6 +153,7 @@ def search_plan(
 ) -> CarLeg:
     """Search with room to spare, then without, in finer and finer bins; ``driving.max_states`` are for all of them.
 
+    A path that touches something between its poses is returned only where no other was found.
     The other arguments are those of ``search_drive``.
     """
     limit = driving.max_states
@@ -172,10 +173,10 @@ def search_plan(
             tolerance=tolerance,
             bins=bins,
             ground=ground,
-            is_known=before.is_known,
+            is_known=before.is_known or len(before.poses) > 0,
         )
         leg, states = replace(leg, stuck=before.stuck if states else leg.stuck), states + leg.states
-        if leg.status in (FOUND, CANCELED, TOO_WIDE):
+        if leg.status in (CANCELED, TOO_WIDE) or (leg.status == FOUND and world.fits_between(leg.poses)):
             break
         if len(before.poses) and not len(leg.poses):
             leg = replace(leg, status=before.status, poses=before.poses, cost=before.cost)

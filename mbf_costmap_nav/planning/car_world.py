@@ -19,9 +19,11 @@ from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.kernels.car.ground import Ground, ground_of, pose_cost
 from mbf_costmap_nav.kernels.car.hybrid_astar import hybrid_search
 from mbf_costmap_nav.kernels.car.motion_primitives import Car
+from mbf_costmap_nav.kernels.map.footprint_cost import first_collision
 from mbf_costmap_nav.kernels.search.grid_search import FOUND, new_search_memory, search
 from mbf_costmap_nav.kernels.search.lazy_field import FieldMemory
 from mbf_costmap_nav.kernels.search.search_cells import whole_grid
+from mbf_costmap_nav.planning.outline_course import BETWEEN_OF_A_CAR, dense
 from mbf_costmap_nav.planning.search_grid import GridPlannerParameters, SearchGrid, SearchWorkspace
 
 FloatArray = NDArray[np.float64]
@@ -114,6 +116,14 @@ class CarWorld:
         """Whether the whole footprint lies on the map and off lethal cells, the centre off inscribed ones."""
         cost = pose_cost(self.costmap.cells, self.unknown, self.grid.geometry, self.samples, planar(pose))
         return bool(cost >= 0)
+
+    def fits_between(self, poses: FloatArray) -> bool:
+        """Whether the footprint touches nothing between poses (n, 3: x, y [m], yaw [rad]) of a drive, either.
+
+        A corner of a cell may reach into the outline between two poses a cell apart; controllers look more often.
+        """
+        grid = self.costmap.cells, self.costmap.resolution, self.costmap.origin_x, self.costmap.origin_y
+        return bool(first_collision(*grid, self.samples, dense(poses, BETWEEN_OF_A_CAR)) < 0)
 
     def leaves_map(self, pose: Pose) -> bool:
         """Whether a part of the footprint lies off the map."""

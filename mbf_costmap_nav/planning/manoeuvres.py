@@ -28,7 +28,7 @@ from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.kernels.map.outline_along import fits_along
 from mbf_costmap_nav.kernels.map.path_poses import headed_poses
-from mbf_costmap_nav.planning.outline_course import ARM, Course, stretches, turn_step
+from mbf_costmap_nav.planning.outline_course import ARM, Course, dense, stretches, turn_step
 
 if TYPE_CHECKING:
     from mbf_costmap_nav.planning.car_search import Driving
@@ -45,8 +45,6 @@ FROM_START_TO_GOAL = 5
 """A search of the whole path may make so many times the states of a search of one piece."""
 MARGINS = (0.5, 0.0)
 """How much larger the outline is taken, in cells."""
-BETWEEN = 3
-"""Poses between two of a manoeuvre that are checked, too: a corner of the outline goes farther than the middle."""
 REVERSE_PENALTY, CHANGE_PENALTY, TURNING_PENALTY = 1.5, 0.5, 1.05
 
 
@@ -201,7 +199,7 @@ class Manoeuvres:
                 states = self.max_states * (FROM_START_TO_GOAL if everywhere else 1)
                 driving = self._driving(self.min_turning_radius or curve * radius, states)
                 leg = search_drive(world, driving, start, goal, ground=ground)
-                if len(leg.poses) and self._check.first_collision(self.costmap, _dense(leg.poses)) < 0:
+                if len(leg.poses) and self._check.first_collision(self.costmap, dense(leg.poses)) < 0:
                     return leg.poses
         return None
 
@@ -224,13 +222,6 @@ class Manoeuvres:
         low = costmap.world_to_cell_clamped(*(places.min(axis=0) - beside).tolist())
         high = costmap.world_to_cell_clamped(*(places.max(axis=0) + beside).tolist())
         return costmap.part(CellBox(*low, high[0] + 1, high[1] + 1))
-
-
-def _dense(poses: FloatArray) -> FloatArray:
-    """Poses (n, 3) a cell apart with ``BETWEEN`` more between any two, as the controllers look at them."""
-    shares = np.arange(BETWEEN + 1)[:, None] / (BETWEEN + 1)
-    between = poses[:-1, None] + shares * (poses[1:] - poses[:-1])[:, None]
-    return np.concatenate([between.reshape(-1, 3), poses[-1:]])
 
 
 def _joined(

@@ -25,6 +25,9 @@ FloatArray = NDArray[np.float64]
 
 ARM = 0.2
 """The heading at a place is that of the line between the points so far [m] before and behind it on the path."""
+BETWEEN, BETWEEN_OF_A_CAR = 3, 9
+"""Poses between two of a manoeuvre, or of the path of a car, that are checked, too: a corner of the outline goes
+farther than the middle."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,13 @@ class Course:
         if yaw is None:
             return np.zeros((0, 3))
         return turn_poses(self.poses[index], yaw, turn_step(check, costmap))
+
+
+def dense(poses: FloatArray, count: int = BETWEEN) -> FloatArray:
+    """Poses (n, 3) a cell apart with ``count`` more between any two, as the controllers look at them."""
+    shares = np.arange(count + 1)[:, None] / (count + 1)
+    between = poses[:-1, None] + shares * (poses[1:] - poses[:-1])[:, None]
+    return np.concatenate([between.reshape(-1, 3), poses[-1:]])
 
 
 def turn_step(check: FootprintCheck, costmap: Costmap) -> float:

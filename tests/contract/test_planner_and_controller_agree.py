@@ -3,6 +3,7 @@
 import re
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from mbf_abstract.geometry import Path as RobotPath
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest, PlanResult, PluginKind
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 
 pytestmark = pytest.mark.usefixtures("one_core")
 
@@ -66,6 +68,7 @@ OTHER_ROBOTS = (
     ("mesh", "heading_astar", "mppi", 2007), ("mesh", "cvp", "follow_path", 2018),
     ("mesh", "cvp", "path_follower", 2148), ("mesh", "dijkstra", "path_follower", 2167),
     ("mesh", "cvp", "vector_field", 2157),
+    ("costmap", "hybrid_astar", "follow_path", 2196),
 )  # fmt: skip
 """Robots with other outlines, inertia, rates of control and delays that touched something, or were refused."""
 THROUGH_GAPS = [
@@ -146,6 +149,16 @@ def test_a_robot_with_another_outline_and_inertia_arrives_and_touches_nothing(ba
     made = world.plugin(PluginKind.PLANNER, planner), world.plugin(PluginKind.CONTROLLER, controller)
     verdict = agreement.drive(world, *made)
     assert verdict.ending == "arrived", verdict
+
+
+def test_a_plan_of_a_car_touches_nothing_between_its_poses_either():
+    world = agreement.WORLDS["costmap"](2196, False, robots.drawn_robot(2196))
+    planner, start = world.plugin(PluginKind.PLANNER, "hybrid_astar"), Pose.planar(1.4946021, 1.0733639, 0.3565901)
+    path = planner.make_plan(PlanRequest(start, world.ends[1])).path
+    poses = np.array([(pose.x, pose.y, pose.yaw) for pose in path])
+    finely = [a + share * (b - a) for a, b in pairwise(poses) for share in np.linspace(0.0, 1.0, 11)]
+    check = FootprintCheck(world.map.footprint, world.resolution)
+    assert check.first_collision(world.map.snapshot(), np.array(finely)) == -1
 
 
 class OnePlan:
