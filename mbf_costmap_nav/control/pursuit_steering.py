@@ -70,7 +70,8 @@ class PursuitSteering(RegulatedFollower):
         p, velocity = self.parameters, cycle.request.velocity
         cost = cycle.costmap.cost_at(cycle.request.pose.x, cycle.request.pose.y) or FREE
         regulated = min(self.regulated_speed(curvature, cost, cycle.tracker.to_cusp), cycle.speed_limit, self._fastest)
-        regulated = min(regulated, self._stopping_speed(cycle))
+        on_arc = self.inertia.speed_on_arc(-curvature if backward else curvature, velocity.wz)
+        regulated = min(regulated, self._stopping_speed(cycle), on_arc)
         wanted = -regulated if backward else regulated
         change = p.acc_lim_x * p.period
         speed = min(max(wanted, velocity.vx - change), velocity.vx + change)

@@ -73,17 +73,19 @@ class SamplingFollower(PathFollower):
     def sampled(self, cycle: ControlCycle, around: MovingAround) -> ControlResult:
         """The best of the sampled motions."""
 
-    def keep_with(self, period: float, *, brakes: bool) -> None:
+    def keep_with(self, period: float, horizon: float, *, brakes: bool) -> None:
         """Keep to the path with the limits of the parameters, and a ``period`` [s] between two calls.
 
-        A robot that ``brakes`` does so along its arc where no motion is free any more; others are stopped by zero.
+        A robot that ``brakes`` does so along its arc where no motion is free any more; others are stopped by zero. It
+        turns to its path by itself where that takes longer than the ``horizon`` [s] of the samples.
         """
         p = self.parameters
         inertia = InertiaParameters(acc_lim_x=p.acc_lim_x, acc_lim_theta=p.acc_lim_theta, control_period=period)
         slowest = {"acc_lim_x": min(p.acc_lim_x, p.acc_lim_y)}
         self._brakes_by = inertia.model_copy(update=slowest) if brakes else InertiaParameters()
         reverses = p.min_vel_x < 0.0
-        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, inertia, self._brakes_by, allow_reversing=reverses)
+        limits, seen = (p.max_vel_x, p.max_vel_theta, inertia, self._brakes_by), horizon if brakes else math.inf
+        self._keeping.drive_with(*limits, allow_reversing=reverses, horizon=seen)
 
     def stops(self, cycle: ControlCycle, velocity: FloatArray, braking: FloatArray, dt: float) -> bool:
         """Whether the robot touches nothing until it stands if no motion is free any more; see ``stops_free``."""

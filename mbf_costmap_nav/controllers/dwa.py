@@ -78,7 +78,7 @@ class DWAController(SamplingFollower):
         """Take over new limits."""
         p = self.parameters
         self._braking = np.array([p.acc_lim_x, p.acc_lim_y, p.acc_lim_theta])
-        self.keep_with(self._period, brakes=p.control_period is not None)
+        self.keep_with(self._period, p.sim_time, brakes=p.control_period is not None)
 
     @property
     def _period(self) -> float:

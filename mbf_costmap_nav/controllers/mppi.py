@@ -116,8 +116,9 @@ class MPPIController(SamplingFollower):
         self._change = np.array([p.acc_lim_x, p.acc_lim_y, p.acc_lim_theta], dtype=np.float32) * np.float32(p.model_dt)
         deviation = [p.vx_std, p.vy_std if p.motion_model == "omni" else 0.0, p.wz_std]
         self._deviation, self._radius = np.array(deviation, dtype=np.float32), self.turning_radius
-        # Who stands within half of what is looked ahead stops on it, as good as.
-        self.keep_with(p.model_dt, brakes=p.max_vel_x > 0.5 * p.acc_lim_x * p.check_ahead_time)
+        # Who stands within half of what is looked ahead, and turns no more by its end, stops on it, as good as.
+        brakes = max(2.0 * p.max_vel_x / p.acc_lim_x, p.max_vel_theta / p.acc_lim_theta) > p.check_ahead_time
+        self.keep_with(p.model_dt, p.model_dt * p.time_steps, brakes=brakes)
         if self._radius > 0.0:
             names = "max_vel_x", "max_vel_theta", "acc_lim_x", "max_path_distance"
             limits = {"min_turning_radius": self._radius, "allow_reversing": p.min_vel_x < 0.0}
@@ -217,8 +218,7 @@ class MPPIController(SamplingFollower):
         """Whether velocities (3, steps) are free, and the first of them can be stopped."""
         p = self.parameters
         first, braking = controls[:, 0].astype(np.float64), self._change.astype(np.float64) / p.model_dt
-        stops = self.stops(cycle, first, braking, p.model_dt)
-        return stops and is_free(cycle, controls, p.model_dt)
+        return self.stops(cycle, first, braking, p.model_dt) and is_free(cycle, controls, p.model_dt)
 
     def _meets(self, controls: Float32Array, cycle: ControlCycle, around: MovingAround) -> bool:
         """Whether the mean (3, steps, 1) meets somebody; that of passing in front of them and behind them may."""

@@ -111,7 +111,9 @@ class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
         if close:
             return close
         error = off_course(math.atan2(carrot[1], carrot[0]), backward)
-        if self.rotates and abs(error) > self.parameters.rotate_to_heading_min_angle:
+        turning, measured = self.parameters.rotate_to_heading_vel, cycle.request.velocity
+        turns = abs(error) > self.parameters.rotate_to_heading_min_angle
+        if self.rotates and (turns or self.inertia.turns_first(error, measured, turning)):
             return curves_ahead(self._turn(cycle, error), error, backward)
         return wider_curves(self._drive(cycle, self._curvature_to(carrot), backward))
 

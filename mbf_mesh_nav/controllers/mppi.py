@@ -67,7 +67,8 @@ class MPPIController(KeepingFollower):
     def parameters_changed(self) -> None:
         """Take over new limits."""
         p = self.parameters
-        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, p, p, allow_reversing=p.min_vel_x < 0.0)
+        horizon = p.model_dt * p.time_steps if p.acc_lim_x < math.inf else math.inf
+        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, p, p, allow_reversing=p.min_vel_x < 0.0, horizon=horizon)
 
     @classmethod
     def reach(cls, parameters: MPPIParameters) -> float:

@@ -173,6 +173,7 @@ class PathFollower(LeavesContacts, BrakesOnItsArc, KeepingFollower):
             target = self._target(share)
             bearing, curvature = arc_to(pose, target)
             turns = abs(bearing) > p.rotate_to_heading_min_angle
+            turns = turns or p.turns_first(bearing, self._measured, p.max_vel_theta)
             wanted = self._turn(bearing) if turns else self._arc(pose, target, curvature, fastest, share)
             command, anyway = self._reachable(wanted), p.acc_lim_x == math.inf and (turns or share == SHARES[-1])
             obstacle = self._obstacle_to(pose, target, bearing, 0.0 if turns else curvature, command)
@@ -193,6 +194,7 @@ class PathFollower(LeavesContacts, BrakesOnItsArc, KeepingFollower):
             math.sqrt(p.max_lateral_acceleration / max(abs(curvature), 1e-6)),
             p.max_vel_theta / max(abs(curvature), 1e-6),
             stopping_speed(left, min(p.decel_lim_x, PLANNED * p.acc_lim_x), p.reaction_time),
+            p.speed_on_arc(curvature, self._measured.wz),
             speed_on_path(tracker, self._measured.vx, p.look_ahead_dist, p, p.max_vel_theta),
             share * p.look_ahead_dist / CLOSELY if share < 1.0 else math.inf,
         )

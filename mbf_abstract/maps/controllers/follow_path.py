@@ -85,6 +85,11 @@ class FollowPath(LeavesContacts, SteeringToPath, BrakesOnItsArc):
         """Length [m] left along the path; inf without one."""
         return self._tracker.remaining if self._tracker else math.inf
 
+    def turns_to_path_after(self, pose: Pose) -> float:
+        """Time [s] in which a robot at ``pose``, in the frame of the path, turns on the spot to the point ahead."""
+        p, angle = self.parameters, self._angle_left(pose, self._tracker) if self._tracker else 0.0
+        return p.turns_after(angle, p.max_vel_theta)
+
     def to_tight_place(self, pose: Pose, speed: float = 0.0) -> float:
         """Length [m] that a robot at ``pose``, in the frame of the path, has to a tight place, see ``TightPlaces``.
 
@@ -182,14 +187,15 @@ class FollowPath(LeavesContacts, SteeringToPath, BrakesOnItsArc):
             return close
         if self._tight_places.is_close(tracker):
             return [self._turn(angle_to_path(tracker, pose, backward))]
-        if abs(error) > p.rotate_to_heading_min_angle:
+        if abs(error) > p.rotate_to_heading_min_angle or p.turns_first(error, self._measured, p.max_vel_theta):
             return curves_ahead(self._turn(error), error, backward)
         left = max(tracker.to_cusp, gap if tracker.on_last_section else 0.0)
         until_turn_ends = p.acc_lim_theta / max(abs(curvature), 1e-6)
         braking = min(p.decel_lim_x, PLANNED * p.acc_lim_x, until_turn_ends)
         stopping = stopping_speed(left, braking, p.reaction_time)
         on_path = speed_on_path(tracker, self._measured.vx, p.look_ahead_dist, p, p.max_vel_theta)
-        speed = min(p.max_vel_x, p.max_vel_theta / max(abs(curvature), 1e-6), stopping, on_path)
+        on_arc = p.speed_on_arc(-curvature if backward else curvature, self._measured.wz)
+        speed = min(p.max_vel_x, p.max_vel_theta / max(abs(curvature), 1e-6), stopping, on_path, on_arc)
         if p.acc_lim_x < math.inf:
             speed = min(speed, speed_before(to_tight, p.acc_lim_x))
         speed = max(speed, min(MIN_SPEED, p.max_vel_x)) * (-1.0 if backward else 1.0)

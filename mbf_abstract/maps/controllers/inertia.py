@@ -21,6 +21,12 @@ SPACING, ARM = 0.1, 2
 """Distance [m] of the points of a path ahead; a bend is what it turns by over so many of them."""
 PLANNED = 0.7
 """Share of its braking that is planned with: a robot that cuts its path comes to the end sooner than by its length."""
+OFF_ARC = 0.1
+"""So far [rad] a robot may fall behind the heading of an arc until it turns as fast as that asks for at its speed."""
+LONG_TURN = 1.5
+"""A robot that stands turns first to its path if that takes longer [s]; it would come far beside it on its way."""
+STILL = 0.02
+"""Slower [m/s] it stands."""
 ROUNDING = 1e-9
 """With less than this share of its speed a robot stands."""
 SINGLE = 1e-6
@@ -72,6 +78,25 @@ class InertiaParameters(PluginParameters):
             return command
         gain, turn_gain = self.acc_lim_x * self.control_period, self.acc_lim_theta * self.control_period
         return reached(command, measured, (gain, gain, turn_gain))
+
+    def speed_on_arc(self, curvature: float, turning: float) -> float:
+        """The speed [m/s] at which a robot that turns at ``turning`` [rad/s] takes up an arc of a curvature [1/m].
+
+        A yaw rate that lags by w while the speed stays leaves the heading behind by w^2 / (2 acc_lim_theta).
+        """
+        if self.acc_lim_theta == math.inf or curvature == 0.0:
+            return math.inf
+        lag = math.sqrt(2.0 * OFF_ARC * self.acc_lim_theta)
+        return max((lag + math.copysign(turning, turning * curvature)) / abs(curvature), CREEPING)
+
+    def turns_after(self, angle: float, turning: float) -> float:
+        """Time [s] in which a robot turns by ``angle`` [rad] from rest to rest; ``turning`` is its largest yaw rate."""
+        return max(abs(angle) / turning, 2.0 * math.sqrt(abs(angle) / self.acc_lim_theta))
+
+    def turns_first(self, angle: float, measured: Twist, turning: float) -> bool:
+        """Whether a robot that is ``measured`` to stand turns by ``angle`` [rad] on the spot, as it turns so slowly."""
+        stands = self.acc_lim_theta < math.inf and abs(measured.vx) <= STILL
+        return stands and self.turns_after(angle, turning) > LONG_TURN
 
     def stops_after(self, motion: Twist) -> float:
         """Time [s] in which a motion is braked along its arc: what takes longer, the speed or the turn, decides."""

@@ -60,7 +60,7 @@ class KeepingToPath:
         self._standing = Standing()
         self._last_arc, self._brakes_by = LastFreeArc(), InertiaParameters()
         self._stood_at: Pose | None = None
-        self._remained = math.inf
+        self._remained = self._horizon = math.inf
         self.is_keeping = False
         """Whether the last command was one along the path."""
         self.car: BrakesOnItsArc | None = None
@@ -79,11 +79,14 @@ class KeepingToPath:
         brakes_by: InertiaParameters,
         *,
         allow_reversing: bool,
+        horizon: float = math.inf,
     ) -> None:
         """Take over the limits [m/s, rad/s] of the controller, and the robot's inertia.
 
-        ``brakes_by`` is how it brakes along its arc where no motion is free any more.
+        ``brakes_by`` is how it brakes along its arc where no motion is free any more. Of a turn to the path that takes
+        longer than ``horizon`` [s] the samples see no good; it is driven as ``follow_path`` drives it.
         """
+        self._horizon = horizon
         self._follower.parameters = FollowPathParameters(
             max_vel_x=max_vel_x,
             max_vel_theta=max_vel_theta,
@@ -165,6 +168,7 @@ class KeepingToPath:
         drives = not limits.is_car or (self.car is not None and self._follower.remaining > AT_END)
         keeps = drives and (
             self._has_stood(request.pose, stood >= p.keep_to_path_after)
+            or self._follower.turns_to_path_after(request.pose) > self._horizon
             or is_narrow()
             or self._follower.to_tight_place(request.pose, request.velocity.vx) < math.inf
         )

@@ -10,6 +10,7 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
 from mbf_abstract.maps.controllers.braking import LastFreeArc
 from mbf_abstract.maps.controllers.inertia import (
+    OFF_ARC,
     InertiaParameters,
     braking_distance,
     reached,
@@ -79,6 +80,26 @@ def test_a_turn_in_proportion_to_the_angle_does_not_overshoot(acc_lim_theta, per
         least = min(least, angle)
     assert abs(angle) < 0.05
     assert least > -0.05
+
+
+@pytest.mark.parametrize("acc_lim_theta", [0.3, 1.0, 4.0])
+@pytest.mark.parametrize(("curvature", "turning"), [(3.0, 0.0), (0.8, 0.2), (-1.5, 0.3), (-3.0, -0.4)])
+def test_a_robot_takes_up_an_arc_no_faster_than_its_heading_follows(acc_lim_theta, curvature, turning):
+    p, step = InertiaParameters(acc_lim_x=1.0, acc_lim_theta=acc_lim_theta), 0.001
+    speed, behind = p.speed_on_arc(curvature, turning), 0.0
+    while abs(speed * curvature - turning) > acc_lim_theta * step:
+        behind += (speed * curvature - turning) * step
+        turning += math.copysign(acc_lim_theta * step, curvature)
+    assert abs(behind) == pytest.approx(OFF_ARC, rel=0.02) or speed == CREEPING
+    assert AT_ONCE.speed_on_arc(curvature, 0.0) == p.speed_on_arc(0.0, 0.4) == math.inf
+
+
+def test_a_robot_that_turns_slowly_turns_to_its_path_before_it_drives():
+    still, drives = Twist(), Twist.planar(0.3)
+    assert SLOW.turns_first(0.6, still, 1.0) and not SLOW.turns_first(0.6, drives, 1.0)
+    assert not SLOW.turns_first(0.2, still, 1.0) and SLOW.turns_first(0.2, still, 0.1)
+    assert not AT_ONCE.turns_first(3.0, still, 1.0)
+    assert SLOW.turns_after(-0.5, 9.0) == pytest.approx(2.0)
 
 
 def path_with_a_bend(turn):
