@@ -10,6 +10,7 @@ until the next one. What cannot be slowed down so fast, the speed or the turn, d
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from dataclasses import replace
 from functools import cached_property
@@ -23,15 +24,34 @@ REFUSALS = (ExePathOutcome.BLOCKED_PATH, ExePathOutcome.NO_VALID_CMD, ExePathOut
 """What says that no motion is free; after other failures the robot must not be driven on what is known of it."""
 
 
+RECENT = 0.3
+"""A robot still has a command that it was given less than this time [s] ago."""
+
+
 class LastFreeArc:
     """The arc of the last command that was found free."""
 
     def __init__(self) -> None:
-        self._arc = Twist()
+        self._arc, self._given, self._given_at = Twist(), Twist(), -math.inf
 
-    def keep(self, command: Command | None) -> None:
-        """Take note of a command; one with a steering angle has no arc to brake along."""
-        self._arc = command if isinstance(command, Twist) else Twist()
+    def keep(self, command: Command | None, now: float) -> None:
+        """Take note of a command given ``now`` [s]; one with a steering angle has no arc to brake along."""
+        self._arc = self._given = command if isinstance(command, Twist) else Twist()
+        self._given_at = now
+
+    def begins_at(self, command: Twist, measured: Twist, now: float) -> Twist:
+        """The velocity from which a robot goes on to a command: its last command where it lags behind that.
+
+        Wheels that slip and weak motors never do all that is commanded. Counted from what is measured, such a robot
+        would be commanded a little more than that for ever.
+        """
+        if now - self._given_at > RECENT:
+            return measured
+        given = self._given
+        lags = _apart(given, command) < _apart(measured, command)
+        turns = abs(given.wz - command.wz) < abs(measured.wz - command.wz)
+        straight = given if lags else measured
+        return Twist.planar(straight.vx, straight.vy, given.wz if turns else measured.wz)
 
     def answer(self, refusal: ControlResult, measured: Twist, inertia: InertiaParameters) -> ControlResult:
         """A refusal, or braking along the arc instead while the robot, ``measured`` to move so, still rolls on it."""
@@ -63,7 +83,13 @@ class BrakesOnItsArc(AbstractController):
         result = self.free_motion(request)
         if not result.success:
             return self.last_arc.answer(result, request.velocity, self.inertia)
+        now = self.clock.now()
         if isinstance(result.command, Twist):
-            result = replace(result, command=self.inertia.reached(result.command, request.velocity))
-        self.last_arc.keep(result.command)
+            begin = self.last_arc.begins_at(result.command, request.velocity, now)
+            result = replace(result, command=self.inertia.reached(result.command, begin))
+        self.last_arc.keep(result.command, now)
         return result
+
+
+def _apart(one: Twist, other: Twist) -> float:
+    return math.hypot(one.vx - other.vx, one.vy - other.vy)

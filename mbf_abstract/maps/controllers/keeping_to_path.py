@@ -192,9 +192,11 @@ class KeepingToPath:
         """An answer as far as the robot can do it until the next, or braking along its arc instead of a refusal."""
         if not result.success:
             return self._last_arc.answer(result, measured, self._brakes_by)
+        now = self._follower.clock.now()
         if isinstance(result.command, Twist):
-            result = replace(result, command=limits.reached(result.command, measured))
-        self._last_arc.keep(result.command)
+            begin = self._last_arc.begins_at(result.command, measured, now)
+            result = replace(result, command=limits.reached(result.command, begin))
+        self._last_arc.keep(result.command, now)
         return result
 
     def _has_stood(self, pose: Pose, stands_now: bool) -> bool:

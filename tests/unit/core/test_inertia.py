@@ -170,7 +170,7 @@ def refused(outcome=ExePathOutcome.BLOCKED_PATH):
 
 def test_a_refusal_is_braking_along_the_last_arc_until_the_robot_stands():
     last_arc, arc = LastFreeArc(), Twist.planar(0.4, wz=0.2)
-    last_arc.keep(arc)
+    last_arc.keep(arc, 0.0)
     speeds, measured = [], arc
     while (answer := last_arc.answer(refused(), measured, SLOW)).success:
         assert answer.message == "it brakes: a box"
@@ -184,14 +184,14 @@ def test_a_refusal_is_braking_along_the_last_arc_until_the_robot_stands():
 def test_the_arc_is_that_of_the_command_however_the_robot_is_measured_to_turn():
     """It was looked at; what is measured only says how much of it is still driven."""
     last_arc = LastFreeArc()
-    last_arc.keep(Twist.planar(0.4, wz=0.2))
+    last_arc.keep(Twist.planar(0.4, wz=0.2), 0.0)
     answer = last_arc.answer(refused(), Twist.planar(0.36, wz=-0.5), SLOW)
     assert planar(answer.command) == pytest.approx(planar(Twist.planar(0.31, wz=0.155)))
 
 
 def test_it_ends_even_where_the_robot_is_measured_to_go_on():
     last_arc, cycles = LastFreeArc(), 0
-    last_arc.keep(Twist.planar(0.4))
+    last_arc.keep(Twist.planar(0.4), 0.0)
     while last_arc.answer(refused(), Twist.planar(0.4), SLOW).success:
         cycles += 1
     assert cycles <= 8
@@ -199,8 +199,36 @@ def test_it_ends_even_where_the_robot_is_measured_to_go_on():
 
 def test_nothing_is_braked_by_what_is_known_no_more_and_cars_have_no_arc():
     last_arc = LastFreeArc()
-    last_arc.keep(Twist.planar(0.4))
+    last_arc.keep(Twist.planar(0.4), 0.0)
     stale = refused(ExePathOutcome.MAP_ERROR)
     assert last_arc.answer(stale, Twist.planar(0.4), SLOW) == stale
-    last_arc.keep(AckermannCommand(0.4, 0.1))
+    last_arc.keep(AckermannCommand(0.4, 0.1), 0.0)
     assert last_arc.answer(refused(), Twist.planar(0.4), SLOW) == refused()
+
+
+@pytest.mark.parametrize("share", [1.0, 0.6])
+def test_a_robot_that_does_only_a_share_of_what_it_is_commanded_is_brought_up_to_its_speed(share):
+    """Wheels that slip: counted from what is measured, 0.15 m/s would be commanded for ever, or little more."""
+    last_arc, wanted, gains = LastFreeArc(), Twist.planar(3.0, wz=0.4), (0.15, 0.15, 0.2)
+    measured, commanded = Twist(), [0.0]
+    for cycle in range(30):
+        now = 0.05 * cycle
+        command = reached(wanted, last_arc.begins_at(wanted, measured, now), gains)
+        assert command.vx <= commanded[-1] + 0.15 + 1e-9
+        last_arc.keep(command, now)
+        commanded.append(command.vx)
+        measured = Twist.planar(share * command.vx, wz=share * command.wz)
+    assert command == wanted
+
+
+def test_a_command_of_long_ago_is_no_beginning():
+    last_arc = LastFreeArc()
+    last_arc.keep(Twist.planar(1.0), 10.0)
+    assert last_arc.begins_at(Twist.planar(2.0), Twist(), 10.1) == Twist.planar(1.0)
+    assert last_arc.begins_at(Twist.planar(2.0), Twist(), 11.0) == Twist()
+
+
+def test_a_robot_that_is_faster_than_its_last_command_goes_on_from_what_is_measured():
+    last_arc = LastFreeArc()
+    last_arc.keep(Twist.planar(0.2, wz=0.5), 0.0)
+    assert last_arc.begins_at(Twist.planar(1.0, wz=-0.5), Twist.planar(0.6, wz=0.1), 0.05) == Twist.planar(0.6, wz=0.1)
