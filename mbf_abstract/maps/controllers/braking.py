@@ -55,7 +55,7 @@ class LastFreeArc:
 
     def answer(self, refusal: ControlResult, measured: Twist, inertia: InertiaParameters) -> ControlResult:
         """A refusal, or braking along the arc instead while the robot, ``measured`` to move so, still rolls on it."""
-        self._arc = inertia.braked(self._arc, measured)
+        self._arc = self._given = inertia.braked(self._arc, measured)
         if refusal.outcome not in REFUSALS or self._arc == Twist():
             return refusal
         return ControlResult(ExePathOutcome.SUCCESS, f"it brakes: {refusal.message}", self._arc)

@@ -232,3 +232,12 @@ def test_a_robot_that_is_faster_than_its_last_command_goes_on_from_what_is_measu
     last_arc = LastFreeArc()
     last_arc.keep(Twist.planar(0.2, wz=0.5), 0.0)
     assert last_arc.begins_at(Twist.planar(1.0, wz=-0.5), Twist.planar(0.6, wz=0.1), 0.05) == Twist.planar(0.6, wz=0.1)
+
+
+def test_after_braking_a_robot_goes_on_from_what_it_was_slowed_down_to():
+    last_arc = LastFreeArc()
+    last_arc.keep(Twist.planar(0.4), 0.0)
+    braked = last_arc.answer(refused(), Twist.planar(0.3), SLOW).command
+    assert 0.0 < braked.vx < 0.3
+    assert last_arc.begins_at(Twist.planar(0.5), Twist.planar(0.3), 0.05) == Twist.planar(0.3)
+    assert last_arc.begins_at(Twist(), Twist.planar(0.3), 0.05) == braked
