@@ -143,7 +143,9 @@ def test_planners_that_raise_crash_or_return_no_plan_have_their_reason_and_the_o
     rows = {row["entry"]: row for row in run_trials(protocol, entries, tmp_path, workers=1, time_limit=600.0)}
 
     assert rows["good"]["success"] and not any(rows[name]["success"] for name in names)
-    assert {rows[name]["failure"] for name in names} == {"error"}
-    assert rows["Raises"]["verdict"] == "ZeroDivisionError: no idea"
-    assert rows["Garbage"]["verdict"] == "AttributeError: 'dict' object has no attribute 'success'"
+    assert [rows[name]["failure"] for name in names] == ["planner", "planner", "error"]
+    raised = "INTERNAL_ERROR: plugin 'bad_planners_Raises' raised ZeroDivisionError in make_plan: no idea"
+    assert rows["Raises"]["verdict"] == raised
+    garbage = "INTERNAL_ERROR: plugin 'bad_planners_Garbage' returned dict from make_plan, not PlanResult"
+    assert rows["Garbage"]["verdict"] == garbage
     assert rows["Crashes"]["verdict"] == "crashed: the process of the run ended with code 3"

@@ -194,7 +194,8 @@ class KeepingToPath:
             return self._last_arc.answer(result, measured, self._brakes_by)
         now = self._follower.clock.now()
         if isinstance(result.command, Twist):
-            begin = self._last_arc.begins_at(result.command, measured, now)
+            # a car's curve is as tight as it can be driven from where the samples begin, which is what is measured
+            begin = measured if limits.is_car else self._last_arc.begins_at(result.command, measured, now)
             result = replace(result, command=limits.reached(result.command, begin))
         self._last_arc.keep(result.command, now)
         return result

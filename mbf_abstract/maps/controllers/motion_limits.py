@@ -41,8 +41,13 @@ class MotionLimits:
     leaves_contacts: bool = True
 
     def reached(self, command: Twist, measured: Twist) -> Twist:
-        """What the robot makes of a command until the next one."""
-        return reached(command, measured, (self.gain, self.side_gain, self.turn_gain))
+        """What the robot makes of a command until the next one; a car's curve gets no tighter than commanded."""
+        result = reached(command, measured, (self.gain, self.side_gain, self.turn_gain))
+        if not self.is_car or result == command:
+            return result
+        curve = command if command.vx != 0.0 else measured
+        tightest = abs(curve.wz / curve.vx * result.vx) if curve.vx != 0.0 else 0.0
+        return Twist.planar(result.vx, 0.0, max(-tightest, min(tightest, result.wz)))
 
     def hold(self, command: Twist, measured: Twist) -> Twist:
         """The same arc within the limits."""
