@@ -62,7 +62,6 @@ class MPPIController(KeepingFollower):
         self._shortest_edge = float(self.mesh_map.neighbour_lengths.min())
         self._ranks_of: tuple[int, float] = (-1, 0.0)  # version of the map and cost limit
         self._ranks: Float32Array = np.zeros(0, dtype=np.float32)
-        self.parameters_changed()
 
     def parameters_changed(self) -> None:
         """Take over new limits."""

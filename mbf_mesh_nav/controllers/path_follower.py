@@ -29,7 +29,6 @@ from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.map.places import FORBIDDEN_COST
 from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, tracker_on_surface
 from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, KeepingFollower
-from mbf_mesh_nav.plugins import MeshContext
 
 SHARES = (1.0, 0.5, 0.25)
 """Shares of the look-ahead that are tried where the arc to a point farther ahead cuts a corner that is not free."""
@@ -82,15 +81,6 @@ class PathFollower(LeavesContacts, BrakesOnItsArc, KeepingFollower):
     Parameters = PathFollowerParameters
     parameters: PathFollowerParameters
     _measured = Twist()
-
-    def __init__(self, context: MeshContext) -> None:
-        super().__init__(context)
-        self.parameters_changed()
-
-    def parameters_changed(self) -> None:
-        """Take over new limits."""
-        p = self.parameters
-        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, p, p, allow_reversing=False)
 
     @classmethod
     def reach(cls, parameters: PathFollowerParameters) -> float:

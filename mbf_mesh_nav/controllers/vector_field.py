@@ -29,7 +29,6 @@ from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, tracker_on_surface
 from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, KeepingFollower
 from mbf_mesh_nav.motion.vector_field import VectorField
-from mbf_mesh_nav.plugins import MeshContext
 
 STRAYING = 2.0
 """The field leads to the goal from anywhere, not back to the path: a robot off the path comes to its end otherwise."""
@@ -75,15 +74,6 @@ class VectorFieldController(BrakesOnItsArc, KeepingFollower):
 
     _face = -1
     _measured = Twist()
-
-    def __init__(self, context: MeshContext) -> None:
-        super().__init__(context)
-        self.parameters_changed()
-
-    def parameters_changed(self) -> None:
-        """Take over new limits."""
-        p = self.parameters
-        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, p, p, allow_reversing=False)
 
     @property
     def inertia(self) -> InertiaParameters:

@@ -78,6 +78,12 @@ class KeepingFollower(SurfaceFollower):
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
         self._keeping = KeepingToPath(context)
+        self.parameters_changed()
+
+    def parameters_changed(self) -> None:
+        """Take over new limits."""
+        p: Any = self.parameters
+        self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, p, p, allow_reversing=False)
 
     def closely(self, request: ControlRequest, fastest: float, *, is_stuck: bool = False) -> ControlResult | None:
         """The motion that keeps to the path where that is to be, see ``KeepingToPath``, at most ``fastest`` [m/s].
