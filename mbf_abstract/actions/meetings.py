@@ -1,4 +1,4 @@
-"""Which recovery a blocked robot runs where it meets other robots, and how near their paths come when they meet.
+"""Whether a blocked robot meets other robots: which failures that causes, how near their paths come, what is run then.
 
 Nobody has to configure it. A robot that announces its path and has loaded a recovery named ``give_way`` runs that one,
 at the distance that ``give_way`` keeps. ``right_of_way_behavior`` names another one or none.
@@ -7,13 +7,31 @@ at the distance that ``give_way`` keeps. ``right_of_way_behavior`` names another
 from __future__ import annotations
 
 from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.plugin_table import PluginTable
+from mbf_abstract.traffic.right_of_way import MEETING_LENGTH
 
 USUAL_NAME = "give_way"
 """The recovery that is run where no other is named."""
 USUAL_DISTANCE = 0.8
 """Robots whose paths come nearer than this [m] meet, where neither the parameter nor the behaviour says how near."""
+BLOCKED = frozenset(
+    [
+        GetPathOutcome.BLOCKED_START,
+        GetPathOutcome.BLOCKED_GOAL,
+        GetPathOutcome.NO_PATH_FOUND,
+        GetPathOutcome.PAT_EXCEEDED,
+        ExePathOutcome.NO_VALID_CMD,
+        ExePathOutcome.PAT_EXCEEDED,
+        ExePathOutcome.COLLISION,
+        ExePathOutcome.OSCILLATION,
+        ExePathOutcome.BLOCKED_GOAL,
+        ExePathOutcome.BLOCKED_PATH,
+        MoveBaseOutcome.OSCILLATION,
+    ]
+)
+"""Failures that another robot in the way causes."""
 
 
 def behavior_for_meetings(runtime: Runtime, plugins: PluginTable) -> str:
@@ -34,6 +52,12 @@ def meeting_distance(runtime: Runtime, plugins: PluginTable) -> float:
     configured = runtime.parameters.right_of_way_distance
     own = own_distance(runtime, plugins) if configured is None else configured
     return USUAL_DISTANCE if own is None else own
+
+
+def meets_others(runtime: Runtime, plugins: PluginTable) -> bool:
+    """Whether the robot meets robots that announce their paths."""
+    distance = meeting_distance(runtime, plugins)
+    return bool(runtime.traffic.rivals(runtime.clock.now(), distance, MEETING_LENGTH))
 
 
 def own_distance(runtime: Runtime, plugins: PluginTable) -> float | None:

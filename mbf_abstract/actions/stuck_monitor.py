@@ -27,35 +27,25 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from mbf_abstract.actions.meetings import behavior_for_meetings, meeting_distance
+from mbf_abstract.actions.meetings import BLOCKED, behavior_for_meetings, meets_others
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.avoided_places import AvoidedPlace, AvoidedPlaces
-from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, is_success, outcome_name
+from mbf_abstract.outcomes import (
+    ExePathOutcome,
+    GetPathOutcome,
+    MoveBaseOutcome,
+    RecoveryOutcome,
+    is_success,
+    outcome_name,
+)
 from mbf_abstract.server.plugin_table import PluginTable
 from mbf_abstract.time.clock import TIME_RESOLUTION
-from mbf_abstract.traffic.right_of_way import MEETING_LENGTH
 
 MOST_MEETINGS = 5
 """How often the right of way is asked for at one place."""
-BLOCKED = frozenset(
-    [
-        GetPathOutcome.BLOCKED_START,
-        GetPathOutcome.BLOCKED_GOAL,
-        GetPathOutcome.NO_PATH_FOUND,
-        GetPathOutcome.PAT_EXCEEDED,
-        ExePathOutcome.NO_VALID_CMD,
-        ExePathOutcome.PAT_EXCEEDED,
-        ExePathOutcome.COLLISION,
-        ExePathOutcome.OSCILLATION,
-        ExePathOutcome.BLOCKED_GOAL,
-        ExePathOutcome.BLOCKED_PATH,
-        MoveBaseOutcome.OSCILLATION,
-    ]
-)
-"""Failures that another robot in the way causes."""
 NO_PLAN = frozenset([GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_GOAL])
 """Failures that closed places may be to blame for."""
 SAME_KIND: dict[int, int] = {ExePathOutcome.COLLISION: ExePathOutcome.BLOCKED_PATH}
@@ -93,8 +83,13 @@ class TroubleSpot:
         where = f"({x:.2f}, {y:.2f})" if z == 0.0 else f"({x:.2f}, {y:.2f}, {z:.2f})"
         outcome = max(self.failures, key=lambda code: len(self.failures[code]))
         count = len(self.failures[outcome])
+        return f"stuck at {where}: {outcome_name(outcome)} {count} times; {self.attempts}"
+
+    @property
+    def attempts(self) -> str:
+        """What was tried here, and how it ended where that was no success."""
         ends = [name if is_success(end) else f"{name} ({outcome_name(end)})" for name, end in self.tried.items()]
-        return f"stuck at {where}: {outcome_name(outcome)} {count} times; tried {', '.join(ends) or 'nothing'}"
+        return f"tried {', '.join(ends) or 'nothing'}"
 
 
 class StuckMonitor:
@@ -136,7 +131,7 @@ class StuckMonitor:
         failures = spot.failures.setdefault(SAME_KIND.get(outcome, outcome), [])
         was_stuck = self._is_too_much(failures)
         failures.append(self._runtime.clock.now())
-        if outcome in BLOCKED and spot.meetings < MOST_MEETINGS and self._meets_others():
+        if outcome in BLOCKED and spot.meetings < MOST_MEETINGS and meets_others(self._runtime, self._plugins):
             self._for_meeting = behavior_for_meetings(self._runtime, self._plugins)
         is_stuck = self._is_too_much(failures)
         self._avoid_or_open(pose, outcome, is_stuck)
@@ -159,11 +154,6 @@ class StuckMonitor:
             self._report_avoided(())
         elif outcome == GetPathOutcome.BLOCKED_START:  # perhaps the robot has slid onto a closed place
             self._avoid_those_left(pose)
-
-    def _meets_others(self) -> bool:
-        """Whether the robot meets robots that announce their paths."""
-        distance = meeting_distance(self._runtime, self._plugins)
-        return bool(self._runtime.traffic.rivals(self._runtime.clock.now(), distance, MEETING_LENGTH))
 
     def _is_too_much(self, times: Sequence[float]) -> bool:
         """Whether failures of one kind at one place, at these times [s], mean that the robot is stuck."""
@@ -235,5 +225,10 @@ class StuckMonitor:
         return self._escalation[spot.escalations - 1]
 
     def described(self, message: str) -> str:
-        """Return the message of a failure, with the place and what was tried if the robot is stuck."""
-        return f"{message}; {self._present}" if self.stuck else message
+        """Return the message of a failure, with place and attempts if the robot is stuck; attempts if one raised."""
+        if (spot := self._present) is None:
+            return message
+        if self.stuck:
+            return f"{message}; {spot}"
+        is_faulty = RecoveryOutcome.INTERNAL_ERROR in spot.tried.values()
+        return f"{message}; {spot.attempts}" if is_faulty else message

@@ -8,6 +8,7 @@ from mbf_abstract.actions.stuck_monitor import StuckMonitor
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
+from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing.scripted_session import ScriptedSession
 
 BLOCKED, COLLISION, MISSED = ExePathOutcome.BLOCKED_PATH, ExePathOutcome.COLLISION, ExePathOutcome.MISSED_PATH
@@ -42,6 +43,14 @@ def stand():
     yield make
     for session in sessions:
         session.close()
+
+
+def test_a_recovery_that_raises_is_named_at_the_end_of_its_goal():
+    with ScriptedSession(planner_max_retries=0) as session:
+        session.planner.play(PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in"))
+        session.recovery.play(ValueError("no idea"))
+        result = session.navigator.go_to(Pose.planar(3.0, 0.0))
+    assert result.message == "walled in; tried recovery (INTERNAL_ERROR)"
 
 
 def test_the_third_failure_of_one_kind_at_one_place_is_one_too_many(stand):
