@@ -60,6 +60,11 @@ def meets_others(runtime: Runtime, plugins: PluginTable) -> bool:
     return bool(runtime.traffic.rivals(runtime.clock.now(), distance, MEETING_LENGTH))
 
 
+def distance_of_meetings(runtime: Runtime, plugins: PluginTable) -> float:
+    """What a robot announces as its ``meeting_distance`` [m]; 0 where it runs nothing in meetings."""
+    return meeting_distance(runtime, plugins) if behavior_for_meetings(runtime, plugins) else 0.0
+
+
 def own_distance(runtime: Runtime, plugins: PluginTable) -> float | None:
     """From which distance [m] the behaviour itself sees others; None where it is not loaded or does not say."""
     named = runtime.parameters.right_of_way_behavior

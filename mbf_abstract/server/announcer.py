@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from mbf_abstract.actions.meetings import distance_of_meetings
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.execution.plan_check import path_in_global_frame
@@ -67,7 +68,14 @@ class Announcer:
             path = np.concatenate([path, self._tracker.ahead(LENGTH)])
             remaining = float(norm(path[1] - path[0])) + self._tracker.remaining
             destination = self._tracker.points[-1]
-        state = Announcement("", now, path, round(remaining, DIGITS), radius=self._server.robot_radius)
+        state = Announcement(
+            "",
+            now,
+            path,
+            round(remaining, DIGITS),
+            radius=self._server.robot_radius,
+            distance=distance_of_meetings(runtime, self._server.plugins),
+        )
         runtime.traffic.announce(self._making_room.announced(state), destination)
         self._making_room.act(pose)
 

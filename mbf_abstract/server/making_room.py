@@ -29,7 +29,7 @@ from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.traffic.announcement import Announcement
-from mbf_abstract.traffic.right_of_way import MEETING_LENGTH, paths_conflict
+from mbf_abstract.traffic.right_of_way import MEETING_LENGTH, distance_between, paths_conflict
 
 IDLE_TIME = 2.0
 """A robot without a goal for this long [s] stands idle; executives send one goal after the other."""
@@ -112,8 +112,9 @@ class MakingRoom:
         """Whether nobody goes where it drives back, or stands there."""
         others = self._runtime.traffic.others(now)
         back = Announcement("back", now, np.array([pose.position, home.position]), 1.0)
-        going = any(one.remaining > 0.0 and paths_conflict(back, one, self._distance, math.inf) for one in others)
-        return not going and all(float(norm(one.path[0] - home.position)) > self._distance for one in others)
+        apart = [(one, distance_between(self._distance, one)) for one in others]
+        going = any(one.remaining > 0.0 and paths_conflict(back, one, distance, math.inf) for one, distance in apart)
+        return not going and all(float(norm(one.path[0] - home.position)) > distance for one, distance in apart)
 
     # ---------------------------------------------------------------------------------------------- what it does
     def _send(self, goal: RecoveryGoal | MoveBaseGoal, why: str) -> None:

@@ -39,6 +39,8 @@ class Announcement:
         Whether it has no goal and pulls out for a robot that asks; see ``server.making_room``.
     asks : bool
         Whether it is blocked and waits for those that make room near its path.
+    distance : float
+        From its own path to that of a robot like this one [m] at which they do not meet; 0 = not known.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Announcement:
     radius: float = 0.0
     makes_room: bool = False
     asks: bool = False
+    distance: float = 0.0
 
     def to_json(self) -> str:
         """Return it as a JSON object, to be sent; ``from_json`` reads it."""
@@ -70,15 +73,17 @@ class Announcement:
                 bool(values["cannot_yield"]),
                 int(values["waits"]),
                 float(values["radius"]),
-                bool(values.get("makes_room", False)),  # robots with an older version do not send these two
+                bool(values.get("makes_room", False)),  # robots with an older version do not send these three
                 bool(values.get("asks", False)),
+                float(values.get("distance", 0.0)),
             )
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise ValueError(f"no announcement of a robot: {type(error).__name__}: {error}") from error
-        numbers = np.array([read.stamp, read.remaining, read.radius, *path.ravel()])
-        if not (read.name and len(path) and np.isfinite(numbers).all() and read.radius >= 0.0):
+        numbers = np.array([read.stamp, read.remaining, read.radius, read.distance, *path.ravel()])
+        if not (read.name and len(path) and np.isfinite(numbers).all() and min(read.radius, read.distance) >= 0.0):
             raise ValueError(
-                "no announcement of a robot: it needs a name, a place and finite numbers, the radius not below 0"
+                "no announcement of a robot: it needs a name, a place and finite numbers, "
+                "the radius and the distance not below 0"
             )
         return read
 

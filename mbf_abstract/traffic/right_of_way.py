@@ -38,6 +38,15 @@ def _rank(robot: Announcement) -> tuple[bool, bool, int, float, str]:
     return robot.makes_room, not robot.cannot_yield, robot.waits, robot.remaining, robot.name
 
 
+def distance_between(own: float, other: Announcement) -> float:
+    """How near the paths of two robots come that meet [m]: the mean of what both keep among robots like themselves.
+
+    So both compute the same, whatever their sizes. ``own`` [m] is that of one of them; it counts alone where the other
+    one announces none.
+    """
+    return 0.5 * (own + other.distance) if other.distance > 0.0 else own
+
+
 def paths_conflict(mine: Announcement, other: Announcement, distance: float, length: float) -> bool:
     """Whether the paths of two robots over the next ``length`` [m] come nearer than ``distance`` [m]; symmetric.
 

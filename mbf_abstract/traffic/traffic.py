@@ -15,7 +15,7 @@ from typing import Protocol
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.traffic.announcement import Announcement
-from mbf_abstract.traffic.right_of_way import face_each_other, paths_conflict, stands_in_the_way
+from mbf_abstract.traffic.right_of_way import distance_between, face_each_other, paths_conflict, stands_in_the_way
 
 MAX_AGE = 3.0
 """A robot that announces nothing new for this long [s] does not count: it is switched off, or out of reach."""
@@ -215,12 +215,14 @@ class Traffic:
         now : float
             [s]
         distance, length : float
-            Their paths come nearer than ``distance`` [m] over the next ``length`` [m] of both.
+            Their paths come nearer than ``distance`` [m] over the next ``length`` [m] of both; for a robot that
+            announces another distance, nearer than ``distance_between`` says.
         """
         own = self.own
         if own is None:
             return ()
-        return tuple(other for other in self.others(now) if _is_rival(own, other, distance, length))
+        others = self.others(now)
+        return tuple(other for other in others if _is_rival(own, other, distance_between(distance, other), length))
 
 
 def _is_rival(own: Announcement, other: Announcement, distance: float, length: float) -> bool:

@@ -105,7 +105,7 @@ class GiveWayRecovery(PullingOutRecovery):
         left = LeftPath(self.navigation_map, self.on_map(begin), self.parameters.distance, self.clock.now())
         self._left = None if before else (begin, left)
         try:
-            result = self.pull_out(request, self._keep_free, "its path")
+            result = self.pull_out(request, self._keep_free, "its path", self.distance_to(before))
             if result.success:
                 return self._stand_aside(request, begin, before, left)
         finally:
@@ -221,10 +221,12 @@ class GiveWayRecovery(PullingOutRecovery):
 
         Its path leads on as the robot stood at ``course``, before it set out to a place that is not free any more.
         """
-        length, rivals = self.parameters.reach + self.parameters.distance, self.rivals()
-        paths = [rival.points_ahead(length) for rival in self._before(rivals)]
+        rivals = self.rivals()
+        before = self._before(rivals)
+        distance = self.distance_to(before)
+        length = self.parameters.reach + distance
+        paths = [rival.points_ahead(length) for rival in before]
         own = paths_to_keep_free(course, self._track, paths, length)
         known = () if rivals else self.navigation_map.tracked_objects(self.clock.now())
-        distance, same_storey = self.parameters.distance, self.navigation_map.same_storey
-        free = paths_beside(self.on_map(course), own, known, distance, same_storey)
+        free = paths_beside(self.on_map(course), own, known, distance, self.navigation_map.same_storey)
         return (in_plane_of(begin, course, points) for points in free)

@@ -23,7 +23,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_abstract.traffic.announcement import Announcement
-from mbf_abstract.traffic.right_of_way import MEETING_LENGTH
+from mbf_abstract.traffic.right_of_way import MEETING_LENGTH, distance_between
 
 ATTEMPTS, PAUSE = 4, 2.0  # to drive to a place; s between two of them
 PathsToKeepFree: TypeAlias = Callable[[Pose, Pose], Iterable[FloatArray]]
@@ -36,8 +36,9 @@ class PullingOutParameters(ManoeuvreParameters):
 
     distance: float = parameter(
         0.8,
-        "How far its base stands from its path, at least: half of both widths and a margin. Others meet it where their "
-        "path comes nearer.",
+        "How far its base stands from its path, at least: how far its outline reaches, half the width of another one "
+        "like it, and a margin. Others meet it where their path comes nearer; of two that announce theirs, the mean "
+        "counts.",
         unit="m",
         gt=0.0,
         le=5.0,
@@ -62,16 +63,22 @@ class PullingOutRecovery(ManoeuvreRecovery):
         p = self.parameters
         return self.traffic.meet(self.clock.now(), p.distance, max(p.reach, MEETING_LENGTH))
 
+    def distance_to(self, robots: Iterable[Announcement]) -> float:
+        """How far its base stands from its path and theirs [m], at least: as far as the largest of them needs."""
+        own = self.parameters.distance
+        return max((distance_between(own, robot) for robot in robots), default=own)
+
     def make_room(self, request: RecoveryRequest) -> RecoveryResult:
         """Pull out for the robots that ask one without a goal, and stop there."""
-        asking = {rival.name for rival in self.rivals()}
+        rivals = self.rivals()
+        asking = {rival.name for rival in rivals}
         if not asking:
             return RecoveryResult(RecoveryOutcome.SUCCESS, "nobody asks for room any more")
 
         def keep_free(begin: Pose, course: Pose) -> Iterator[FloatArray]:
             return self._paths_of_others(begin, asking)
 
-        result = self.pull_out(request, keep_free, "the paths of others")
+        result = self.pull_out(request, keep_free, "the paths of others", self.distance_to(rivals))
         if not result.success:
             return result
         place, names = request.motion.pose(), ", ".join(sorted(asking))
@@ -85,10 +92,12 @@ class PullingOutRecovery(ManoeuvreRecovery):
             if len(points):
                 yield points
 
-    def pull_out(self, request: RecoveryRequest, keep_free: PathsToKeepFree, beside: str) -> RecoveryResult:
+    def pull_out(
+        self, request: RecoveryRequest, keep_free: PathsToKeepFree, beside: str, distance: float
+    ) -> RecoveryResult:
         """Search a place and drive there section by section; search anew where the drive there is not free.
 
-        ``beside`` says in the text of a failure what the place has to be beside of.
+        ``beside`` says in the text of a failure what the place has to be beside of, by ``distance`` [m].
         """
         p, token = self.parameters, request.cancel_token
         result = RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
@@ -99,11 +108,11 @@ class PullingOutRecovery(ManoeuvreRecovery):
                 if not paused.success:
                     return paused
             begin = request.motion.pose()
-            steps = self._manoeuvre(begin, keep_free(begin, course), request)
+            steps = self._manoeuvre(begin, keep_free(begin, course), distance, request)
             if token.cancelled:
                 return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
             if steps is None:
-                text = f"no place {p.distance:g} m beside {beside} within a manoeuvre of {p.reach:g} m"
+                text = f"no place {distance:.3g} m beside {beside} within a manoeuvre of {p.reach:g} m"
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
             self.traffic.set_cannot_yield(False)
             result = self.drive_along(begin, steps, request)
@@ -128,13 +137,15 @@ class PullingOutRecovery(ManoeuvreRecovery):
         is_car, navigation_map = self.min_turning_radius > 0.0, self.navigation_map
         return is_car or not navigation_map.obstacle_on_path(self.on_map(pose), command, seconds)
 
-    def _manoeuvre(self, begin: Pose, keep_free: Iterable[FloatArray], request: RecoveryRequest) -> list[Step] | None:
+    def _manoeuvre(
+        self, begin: Pose, keep_free: Iterable[FloatArray], distance: float, request: RecoveryRequest
+    ) -> list[Step] | None:
         """Shortest manoeuvre in the plane of ``begin`` to a place beside the first of these for which there is one."""
         p, token = self.parameters, request.cancel_token
         start, turning_radius = self.on_map(begin), self.min_turning_radius
         for free in keep_free:
             steps = find_pull_out(
-                self.navigation_map, start, free, p.distance, p.reach, turning_radius, lambda: token.cancelled
+                self.navigation_map, start, free, distance, p.reach, turning_radius, lambda: token.cancelled
             )
             if steps is not None or token.cancelled:
                 return steps

@@ -167,6 +167,16 @@ def test_a_robot_that_has_pulled_out_is_not_in_the_way_of_the_first_one(give_way
     assert not paths_conflict(place, announced("ben", 5.3, 0.5, 1.0), distance, 5.0)
 
 
+@pytest.mark.parametrize(("others", "expected"), [(1.6, 1.2), (0.4, 0.6), (0.0, 0.8)])
+def test_it_stands_as_far_off_as_it_and_the_first_one_need_and_no_farther(give_way, others, expected):
+    """Among robots like itself it keeps 0.8 m; the first one is larger, smaller, or does not say."""
+    traffic = head_on(remaining=1.0)
+    traffic._channel.publish(replace(announced("ben", 5.3, 0.5, 1.0), distance=others))
+    result, motion = give_way(hall, traffic=traffic, longest_wait=1.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert expected < abs(motion.end.y - 3.0) < expected + 0.2
+
+
 def into_the_bay(height):
     """Traffic of ``head_on``; the first one turns into the bay behind, or at a height [m] above the bay."""
     traffic = head_on(remaining=1.0)

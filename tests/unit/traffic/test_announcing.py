@@ -9,6 +9,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryResult
 from mbf_abstract.server.announcer import IDLE_TIME, LENGTH, Announcer
 from mbf_abstract.testing.faulty import slow
+from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery
 from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.right_of_way import paths_conflict
 from mbf_abstract.traffic.traffic import MAX_AGE, SharedChannel, Traffic
@@ -72,6 +73,16 @@ def test_a_robot_without_a_goal_goes_nowhere_after_its_idle_time_and_not_before(
     assert robot.announced().remaining > 0.0
     robot.clock.sleep_until(ended + IDLE_TIME)
     assert robot.announced().remaining == 0.0
+
+
+@pytest.mark.parametrize(("behavior", "expected"), [(None, 0.7), ("", 0.0)])
+def test_how_far_it_keeps_from_others_is_announced_where_it_runs_something_in_meetings(
+    make_session, behavior, expected
+):
+    plugins = {"planner": ScriptedPlanner, "controller": ScriptedController, "give_way": ScriptedRecovery}
+    session, channel = make_session(plugins, right_of_way_behavior=behavior, right_of_way_distance=0.7), SharedChannel()
+    Announcer(session.server, "anna", channel).announce()
+    assert channel.latest()[0].distance == expected
 
 
 def test_a_question_about_another_place_is_not_announced(robot):

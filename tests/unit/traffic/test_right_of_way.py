@@ -26,6 +26,7 @@ announcements = st.builds(
     waits=st.integers(0, 2),
     makes_room=st.booleans(),
     asks=st.booleans(),
+    distance=st.sampled_from([0.0, 0.6, 1.0]),
 )
 fleets = st.lists(announcements, min_size=2, max_size=5, unique_by=lambda one: one.name)
 
@@ -135,6 +136,7 @@ def test_a_robot_faces_another_one_that(other, expected):
         '{"name":"a","stamp":0,"path":[[0,0,0]],"remaining":0,"cannot_yield":false,"radius":0}',
         '{"name":"a","stamp":0,"path":[[0,0,0]],"remaining":0,"cannot_yield":false,"waits":0,"radius":-0.1}',
         '{"name":"a","stamp":0,"path":[[0,0,0]],"remaining":0,"cannot_yield":false,"waits":0,"radius":1e999}',
+        '{"name":"a","stamp":0,"path":[[0,0,0]],"remaining":0,"cannot_yield":false,"waits":0,"radius":0,"distance":-1}',
         "9" * 400,
         "null",
         pytest.param("[" * 100_000, id="nested too deeply"),
@@ -215,6 +217,17 @@ def pair():
     assert made.meet() == [["ben"], ["anna"]]
     assert made.first() == "anna"
     return made
+
+
+@pytest.mark.parametrize(("apart", "meet"), [(0.65, True), (0.75, False)])
+def test_a_small_and_a_large_robot_meet_mutually_at_the_mean_of_what_both_keep(apart, meet):
+    channel, keeps = SharedChannel(), {"anna": 0.4, "ben": 1.0}
+    robots = {name: Traffic() for name in keeps}
+    for (name, traffic), (x_from, x_to, y) in zip(robots.items(), [(0.0, 4.0, 0.0), (4.0, 0.0, apart)], strict=True):
+        traffic.connect(name, channel)
+        path = np.array([(x_from, y, 0.0), (x_to, y, 0.0)])
+        traffic.announce(Announcement("", 1.0, path, 4.0, distance=keeps[name]))
+    assert [bool(traffic.rivals(1.0, keeps[name], LENGTH)) for name, traffic in robots.items()] == [meet, meet]
 
 
 def test_one_that_yields_by_driving_forward_does_not_overtake_in_rank(pair):
