@@ -10,6 +10,8 @@ from pydantic import field_validator
 
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.scenarios.faults import Fault
+from terrain.scenarios.noise import LocalizationNoise
+from terrain.scenarios.perturbation import Perturbation
 from terrain.scenarios.places import Place
 from terrain.urdf_robots.robot_choice import RobotChoice
 
@@ -40,6 +42,9 @@ class OwnRobot(ParameterModel):
     backend: str | None = parameter(None, "Map backend.")
     navigation: dict[str, Path] | None = parameter(None, "Configuration file of each backend.")
     sensors: tuple[Sensor, ...] | None = parameter(None, "Its lidars and cameras.")
+    odometry: Literal["exact", "wheels"] | None = parameter(None, "Its velocity: the true one, or that of its wheels.")
+    localization: LocalizationNoise | None = parameter(None, "Noise of its pose.")
+    perturb: Perturbation | None = parameter(None, "What each run may change of it, and how late its commands are.")
     faults: tuple[Fault, ...] | None = parameter(None, "What goes wrong with its sensors and its localisation.")
 
     @field_validator("name")

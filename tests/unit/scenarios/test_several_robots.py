@@ -77,6 +77,14 @@ def test_each_robot_drives_the_scenario_with_its_own_values_in_place_of_it(tmp_p
     assert ben.navigation == anna.navigation
 
 
+def test_each_robot_may_have_noise_and_late_commands_of_its_own(tmp_path):
+    own = "robot: husky, odometry: wheels, localization: {yaw_noise: 2.0}, perturb: {command_delay: 0.1}"
+    text = PAIR.replace("robot: husky", own) + "perturb: {command_delay: 0.2}\n"
+    anna, ben = robot_scenarios(pair(tmp_path, text)).values()
+    assert (anna.odometry, anna.localization.yaw_noise, anna.perturb.command_delay) == ("exact", 0.0, 0.2)
+    assert (ben.odometry, ben.localization.yaw_noise, ben.perturb.command_delay) == ("wheels", 2.0, 0.1)
+
+
 def test_a_scenario_without_robots_is_that_of_its_only_robot():
     indoor = load_scenario("indoor")
     assert robot_scenarios(indoor) == {"": indoor}
