@@ -20,8 +20,9 @@ SAME_PLACE = 1.0
 """A detour that was asked for less than this far away [m] was asked for here."""
 TAKEN_PAUSE = 2.0
 """For so long [s] a detour that was taken is driven before another one is asked for at the same place."""
-BEHIND = 2.0
-"""So far [m] behind where the path meets somebody who stands a detour may lead back to it."""
+BEHIND, LEAST_BEHIND = 2.0, 0.8
+"""So far [m] behind where the path meets somebody who stands a detour leads back to it; at least so far, where somebody
+else moves there."""
 SHORT_DETOUR = 5.0
 """A detour is taken in any case if it is longer by no more than this [m]."""
 
@@ -126,10 +127,12 @@ class Detour(UpdatePath):
         if self.mission.path is None:
             return None
         ahead = blockages_ahead(self.mission, MARGIN)
-        if not any(other.by.motion is Motion.MOVING for other in ahead[1:]):
+        moving = [other.distance for other in ahead[1:] if other.by.motion is Motion.MOVING]
+        if not moving:
             return None
-        path = self.mission.path_to_follow()
-        behind = int(np.searchsorted(path.length - path.remaining_lengths, ahead[0].distance + BEHIND))
+        first, path = ahead[0].distance, self.mission.path_to_follow()
+        back = max(min(first + BEHIND, moving[0]), first + LEAST_BEHIND)  # before who moves, or there is no plan to it
+        behind = int(np.searchsorted(path.length - path.remaining_lengths, back))
         return path[behind:] if behind < len(path) - 1 else None
 
     def take_result(self, result: ActionResult) -> None:

@@ -18,6 +18,7 @@ from mbf_abstract.goals.arrival_tolerance import planned_tolerance, tolerance_le
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.goals.result_types import ActionResult, ExePathResult, GetPathResult, RefinePathResult
+from mbf_abstract.outcomes import is_success
 
 
 class ActionLeaf(Leaf):
@@ -189,6 +190,8 @@ class ExePath(ActionLeaf):
         feedback = None if self.handle is None else self.handle.feedback
         if feedback is not None:
             self.mission.feedback = feedback
+            if not is_success(feedback.outcome):
+                self.mission.refused = self.mission.clock.now()
             if status == Status.RUNNING:
                 self.feedback_message = f"{feedback.distance_along_path:.2f} m to go: {feedback.message}"
         return status

@@ -57,6 +57,7 @@ class MissionContext:
     drive: ExePathResult | None = None
     feedback: ExePathFeedback | None = None
     failure: ActionResult | None = None
+    refused: float | None = None
     detour_asked: tuple[Pose, float, bool] | None = None
     stuck: StuckMonitor = field(init=False, repr=False)
     _handles: list[AnyGoalHandle] = field(default_factory=list, repr=False)
@@ -83,7 +84,7 @@ class MissionContext:
     def begin(self, target: Pose) -> None:
         """Forget everything about the old target and go to another one."""
         self.target, self.path, self.plan, self.drive = target, None, None, None
-        self.feedback, self.failure, self.detour_asked = None, None, None
+        self.feedback, self.failure, self.refused, self.detour_asked = None, None, None, None
         self.stuck.restart()
 
     def fail(self, failure: ActionResult) -> None:
@@ -101,6 +102,10 @@ class MissionContext:
             return self.navigator.server.runtime.robot.velocity().speed < speed
         except RobotStateError:
             return False
+
+    def controller_has_refused_within(self, seconds: float) -> bool:
+        """Whether a cycle of driving along the mission's path has failed in the last ``seconds``."""
+        return self.refused is not None and self.clock.now() - self.refused <= seconds
 
     def required_target(self) -> Pose:
         """Return the target; raises ValueError where the mission has none."""

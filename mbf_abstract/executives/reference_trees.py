@@ -24,9 +24,10 @@ from mbf_abstract.executives.detours import TAKEN_PAUSE, Detour, UpdatePath
 from mbf_abstract.executives.escalation import Escalation
 from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery
 from mbf_abstract.executives.map_leaves import CheckPose, PathBlocked
+from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.executives.pacing import Delay, InBackground
 from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
-from mbf_abstract.executives.trees.by_motion import EndDrive, PickByMotion
+from mbf_abstract.executives.trees.by_motion import MARGIN, EndDrive, PickByMotion, first_in_the_way
 from mbf_abstract.executives.trees.options import TreeOptions
 from mbf_abstract.executives.trees.overtaking import IsHeldUp, Overtake
 from mbf_abstract.executives.watchdogs import MotorWatchdog, OscillationWatchdog, ProgressWatchdog
@@ -37,12 +38,14 @@ BLOCKED = (ExePathOutcome.BLOCKED_PATH, ExePathOutcome.BLOCKED_GOAL, ExePathOutc
 OFF_THE_PATH = (ExePathOutcome.MISSED_PATH, ExePathOutcome.MISSED_GOAL)
 IN_CONTACT = (ExePathOutcome.COLLISION, ExePathOutcome.ROBOT_STUCK)
 SECOND_PLANNER_SLOT = 1
-LOOK_PERIOD = 0.7
+LOOK_PERIOD = 0.3
 """Time [s] between two looks at the path of a tree that asks who is on it."""
-STANDING = 1.5
-"""Who has been seen to stand for less than this [s] may be about to move."""
+STANDING = 1.9
+"""Who has been seen to stand for less than this [s] may be about to move, and maps may still predict that they do."""
 CREEPING = 0.2
-"""A robot slower than this [m/s] before somebody who stands is taken to be waited for."""
+"""A robot slower than this [m/s] before somebody who stands is held up by them."""
+NEAR = 1.2
+"""Who stands is planned around from this distance [m] ahead on: a robot that has come up to them cannot turn."""
 
 
 def navigation_tree(options: TreeOptions = TreeOptions()) -> Behaviour:
@@ -113,15 +116,25 @@ def _second_planner(options: TreeOptions) -> Behaviour:
         return _if_blocked(options, update)
     # Who comes or crosses is waited for: a path around where they are now would lead through where they go.
     around = _detour("update path", options, planner, SECOND_PLANNER_SLOT)
-    creeps = Do("robot stands?", lambda mission: mission.robot_is_slower_than(CREEPING))
+    comes_up = Do("robot comes up to it?", _comes_up_to_somebody)
     passing = _detour("pass it", options, planner, SECOND_PLANNER_SLOT)
-    both_stand = Sequence("both stand", memory=True, children=[creeps, passing])
-    for_standing: dict[Motion, Behaviour] = {Motion.WAITING: both_stand, Motion.PARKED: around}
+    nearby = Sequence("near it", memory=True, children=[comes_up, passing])
+    for_standing: dict[Motion, Behaviour] = {Motion.WAITING: nearby, Motion.PARKED: around}
     by_motion = PickByMotion("who blocks it?", for_standing, nobody=around, standing=STANDING)
     past = Overtake("path past it", planner, SECOND_PLANNER_SLOT, options.longest_update, options.refiner)
     overtake = Sequence("overtake", memory=True, children=[IsHeldUp(), past])
     nodes = [_if_blocked(options, by_motion), overtake, _beside(options, planner)]
     return Selector("update", memory=True, children=nodes)
+
+
+def _is_held(mission: MissionContext) -> bool:
+    """Whether the robot creeps, or soon will, as its controller refuses."""
+    return mission.robot_is_slower_than(CREEPING) or mission.controller_has_refused_within(LOOK_PERIOD)
+
+
+def _comes_up_to_somebody(mission: MissionContext) -> bool:
+    """Whether somebody holds the robot up, or is so near that it is about to brake for them."""
+    return _is_held(mission) or first_in_the_way(mission, NEAR, MARGIN) is not None
 
 
 def _if_blocked(options: TreeOptions, update: Behaviour) -> Behaviour:
@@ -131,7 +144,7 @@ def _if_blocked(options: TreeOptions, update: Behaviour) -> Behaviour:
 
 def _beside(options: TreeOptions, planner: str) -> Behaviour:
     """Where the robot creeps past somebody who stands: a path with more room, or the end of the drive."""
-    creeps = Do("robot creeps?", lambda mission: mission.robot_is_slower_than(CREEPING))
+    creeps = Do("robot creeps?", _is_held)
     roomier = _detour("with more room", options, planner, SECOND_PLANNER_SLOT, once=True)
     known: dict[Motion, Behaviour] = {Motion.WAITING: roomier, Motion.PARKED: roomier}
     came: Behaviour | None = None

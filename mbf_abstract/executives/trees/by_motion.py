@@ -111,7 +111,7 @@ class EndDrive(Leaf):
     """End the drive beside which it runs: one that waits for the robot has stood in the way for too long.
 
     Neither gets on until one gives way. The mission's failure becomes BLOCKED_PATH; where that one has stood for less,
-    or a detour around it is driven, the node fails.
+    the robot is more than half past it, or a detour around it is driven, the node fails.
     """
 
     def __init__(self, name: str, length: float = 3.0) -> None:
@@ -123,7 +123,7 @@ class EndDrive(Leaf):
     def update(self) -> Status:
         """Ask who it is, and for how long it stands."""
         first = first_in_the_way(self.mission, self.length, MARGIN)
-        if first is None or first.by.standing < self._patience_with(first) or self._passes():
+        if first is None or first.by.standing < self._patience_with(first) or first.ahead < 0.0 or self._passes():
             return Status.FAILURE
         text = f"object {first.by.number} waits for the robot and has stood for {first.by.standing:.1f} s"
         self.mission.fail(ActionResult(int(ExePathOutcome.BLOCKED_PATH), text))

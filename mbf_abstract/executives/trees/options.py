@@ -24,13 +24,13 @@ class TreeOptions:
         Leads a robot off ground that is closed to it, where no plan begins; empty = none.
     wait, give_way : str
         Where a tracked object blocks the path: ``wait`` for one that moves, and no second planner, but for one that
-        goes along the path slowly and has room beside it (``overtaking.py``); around one that stands while this robot
-        stands or creeps, as it may wait for this one, a plan, which is taken where it is no more than
-        ``longest_update`` or a few metres longer; then ``wait`` twice, then ``give_way``. ``give_way`` comes at once
-        before one that came along the path, or moved and has stood for 6 s, or for 10 s where it went where the robot
-        goes, and may queue there: it waits for the robot, too, and may have turned round on the spot; one that is
-        parked is planned around at once. A path that is blocked by nobody has ``move_away`` as its last recovery, too.
-        Empty, the default: nobody asks.
+        goes along the path slowly and has room beside it (``overtaking.py``); around one that stands, once this
+        robot has come near, creeps, or its controller refuses, a plan, which is taken where it is no more than
+        ``longest_update`` or a few metres longer; then ``wait`` twice, then ``give_way``. ``give_way`` comes at
+        once before one that came along the path, or moved and has stood for 6 s, or for 10 s where it went where
+        the robot goes, and may queue there: it waits for the robot, too, and may have turned round on the spot; one
+        that is parked is planned around at once. A path that is blocked by nobody has ``move_away`` as its last
+        recovery, too. Empty, the default: nobody asks.
     check_poses : bool
         Whether navigation first looks whether robot and goal stand free.
     second_planner_pause : float

@@ -14,6 +14,10 @@ from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 
 STEP = 0.2
 """Time [s] between two looks at where a moving object will be."""
+CHORD = 0.3
+"""Over so much of a path [m] the way that it leads is looked at."""
+SAME_WAY = 0.7
+"""From this cosine on between the path and its way somebody goes where the path goes."""
 
 
 @dataclass(frozen=True)
@@ -31,18 +35,24 @@ class Blockage:
     along : float
         Cosine of the angle between the path there and the way the object was seen to come last: 1 = it goes where the
         robot goes, -1 = it comes along the path; 0 also where it was never seen to move.
+    ahead : float
+        How far [m] its middle is ahead of the first pose, the way that the path leads there; negative = the robot is
+        getting past it.
     """
 
     by: TrackedObject
     pose: int
     distance: float
     along: float = 0.0
+    ahead: float = 0.0
 
 
 def blockages(
     box: RobotBox, path: Path, objects: Iterable[TrackedObject], within_time: float, same_storey: float = SAME_STOREY
 ) -> tuple[Blockage, ...]:
     """Objects that block a path, in the order of their places along it.
+
+    Who comes from behind the first pose, the way that the path leads, follows the robot, and is not in its way.
 
     Parameters
     ----------
@@ -57,6 +67,8 @@ def blockages(
     heights = path.positions[:, 2]
     found = []
     for known in objects:
+        if _follows(known, poses):
+            continue
         ahead = within_time if known.motion is Motion.MOVING else 0.0
         times = np.linspace(0.0, ahead, math.ceil(ahead / STEP) + 1)
         places = np.column_stack(known.position_in(times))
@@ -66,8 +78,23 @@ def blockages(
         if touches.any():
             pose = int(np.argmax(touches))
             distance = path.length - float(path.remaining_lengths[pose])
-            found.append(Blockage(known, pose, distance, _along(known, poses, pose)))
+            found.append(Blockage(known, pose, distance, _along(known, poses, pose), _ahead(known, poses)))
     return tuple(sorted(found, key=lambda blockage: (blockage.pose, blockage.by.number)))
+
+
+def _ahead(known: TrackedObject, poses: FloatArray) -> float:
+    """How far [m] an object is ahead of the first of the poses (n, 3), the way that they lead; negative = behind."""
+    far = np.hypot(poses[:, 0] - poses[0, 0], poses[:, 1] - poses[0, 1]) >= CHORD
+    dx, dy = (poses[int(np.argmax(far)) if far.any() else -1, :2] - poses[0, :2]).tolist()
+    length = math.hypot(dx, dy)
+    x, y = known.x - float(poses[0, 0]), known.y - float(poses[0, 1])
+    return (dx * x + dy * y) / length if length > 0.0 else math.hypot(x, y)
+
+
+def _follows(known: TrackedObject, poses: FloatArray) -> bool:
+    """Whether an object moves, is behind the first of the poses (n, 3), and goes where the path goes there."""
+    moves = known.motion is Motion.MOVING and len(poses) > 0
+    return moves and _ahead(known, poses) < 0.0 and _along(known, poses, 0) >= SAME_WAY
 
 
 def _along(known: TrackedObject, poses: FloatArray, pose: int) -> float:

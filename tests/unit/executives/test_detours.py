@@ -35,9 +35,9 @@ def on_the_path(monkeypatch):
     return know
 
 
-def somebody(motion=Motion.WAITING, standing=3.0, distance=1.0, along=0.0):
+def somebody(motion=Motion.WAITING, standing=3.0, distance=1.0, along=0.0, ahead=1.0):
     known = SimpleNamespace(motion=motion, standing=standing, number=7, course=(along, 0.0))
-    return Blockage(known, 0, distance, along)
+    return Blockage(known, 0, distance, along, ahead)
 
 
 def creep(session, cycles=80):
@@ -80,6 +80,25 @@ def test_before_one_that_stands_for_too_long_the_drive_ends(
     session.planner.play(straight_plan, NO_PATH)
     assert run(session).success
     assert recoveries(session)[:1] == yields
+
+
+def test_the_drive_goes_on_past_one_that_the_robot_is_more_than_half_past(make_session, recoveries, on_the_path):
+    session = make_session()
+    on_the_path(session, somebody(standing=20.0, along=-1.0, ahead=-0.1))
+    creep(session, 40)
+    session.planner.play(straight_plan, NO_PATH)
+    assert run(session).success
+    assert recoveries(session) == []
+
+
+def test_a_controller_that_refuses_beside_somebody_asks_for_more_room_before_the_robot_creeps(
+    make_session, recoveries, on_the_path
+):
+    session = make_session(controller_max_retries=3)
+    on_the_path(session, somebody(), state=CellState.INSCRIBED)
+    session.controller.play(*[drive(0.5)] * 10, BLOCKED, *[drive(0.5)] * 20, session.controller.follow)
+    assert run(session).success
+    assert len(session.planner.requests) == 2 and recoveries(session) == []
 
 
 def test_one_that_stopped_when_the_robot_crept_already_stopped_for_it(make_session, recoveries, on_the_path):
@@ -136,15 +155,16 @@ def test_before_one_that_came_along_the_path_giving_way_is_the_first_recovery(
     assert recoveries(session) == recovery
 
 
+@pytest.mark.parametrize(("moves", "back"), [(5.0, 3.0), (2.4, 2.4), (1.3, 1.8)], ids=["far", "near", "too near"])
 def test_around_one_that_stands_before_one_that_moves_a_detour_leads_back_to_the_path_between_both(
-    make_session, on_the_path
+    make_session, on_the_path, moves, back
 ):
     session = make_session()
-    on_the_path(session, somebody(), somebody(Motion.MOVING, 0.0, 5.0))
+    on_the_path(session, somebody(), somebody(Motion.MOVING, 0.0, moves))
     creep(session)
     assert run(session).success
     _, around, *_ = session.planner.requests
-    assert around.goal.x == pytest.approx(around.start.x + 3.0, abs=0.6) and around.dist_tolerance == 0.0
+    assert around.goal.x == pytest.approx(around.start.x + back, abs=0.15) and around.dist_tolerance == 0.0
     assert session.robot.pose.distance_to(GOAL) < 0.15
 
 

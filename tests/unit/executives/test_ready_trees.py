@@ -159,9 +159,9 @@ def test_who_is_in_the_way_decides_between_waiting_and_planning_around(
         assert (plans(session), recoveries(session)) == (2, [] if motion is Motion.PARKED else ["relax"])
 
 
-def on_the_path(session, monkeypatch, motion):
-    """Somebody has been standing a metre ahead for three seconds, and the map sees the path blocked there."""
-    somebody = Blockage(SimpleNamespace(motion=motion, standing=3.0, course=(0.0, 0.0)), 0, 1.0)
+def on_the_path(session, monkeypatch, motion, distance=1.0):
+    """Somebody has been standing so far ahead [m] for three seconds, and the map sees the path blocked there."""
+    somebody = Blockage(SimpleNamespace(motion=motion, standing=3.0, course=(0.0, 0.0)), 0, distance)
     blocked = SimpleNamespace(state=CellState.LETHAL)
     queries = SimpleNamespace(what_blocks=lambda path, margin: (somebody,), check_path=lambda *asked: blocked)
     monkeypatch.setattr(type(session.server), "queries", queries)
@@ -170,13 +170,17 @@ def on_the_path(session, monkeypatch, motion):
 ASKING = replace(OPTIONS, wait="relax", give_way="back_up")
 
 
-@pytest.mark.parametrize(("motion", "speed", "asks"), [("parked", 0.5, 2), ("waiting", 0.5, 1), ("waiting", 0.1, 2)])
-def test_who_stands_is_planned_around_while_driving_if_parked_or_if_both_stand(
-    make_session, recoveries, monkeypatch, motion, speed, asks
+@pytest.mark.parametrize(
+    ("motion", "distance", "speed", "asks"),
+    [("parked", 2.0, 0.5, 2), ("waiting", 2.0, 0.5, 1), ("waiting", 1.0, 0.5, 2), ("waiting", 2.0, 0.1, 2)],
+    ids=["parked", "waiting and far", "waiting and near", "both stand"],
+)
+def test_who_stands_is_planned_around_while_driving_if_parked_or_near_or_if_both_stand(
+    make_session, recoveries, monkeypatch, motion, distance, speed, asks
 ):
     session = make_session()
-    on_the_path(session, monkeypatch, Motion(motion))
-    session.controller.play(*[drive(speed)] * 40, session.controller.follow)
+    on_the_path(session, monkeypatch, Motion(motion), distance)
+    session.controller.play(*[drive(speed)] * 36, session.controller.follow)
     options = replace(ASKING, second_planner_pause=8.0)
     assert run(session, navigation_tree(options), Pose.planar(30.0, 0.0)).success
     assert recoveries(session) == [] and len([r for r in session.planner.requests if r.start.x < 1.0]) == asks

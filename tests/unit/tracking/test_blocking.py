@@ -50,6 +50,25 @@ def test_it_is_known_whether_who_stands_came_along_the_path(course, along):
     assert blockages(DISC, STRAIGHT, [stands], 2.0)[0].along == pytest.approx(along)
 
 
+@pytest.mark.parametrize(("x", "ahead"), [(0.4, 0.4), (-0.1, -0.1), (4.0, 4.0)])
+def test_it_is_known_how_far_ahead_somebody_is(x, ahead):
+    (blockage,) = blockages(DISC, STRAIGHT, [known(x=x, motion=Motion.WAITING)], 2.0)
+    assert blockage.ahead == pytest.approx(ahead)
+
+
+def test_who_is_ahead_of_a_robot_that_is_going_to_turn_round_is_behind_its_path():
+    back = Path.from_points([(-0.1 * step, 0.0, 0.0) for step in range(81)])
+    (blockage,) = blockages(DISC, back, [known(x=0.4, motion=Motion.WAITING)], 2.0)
+    assert blockage.ahead == pytest.approx(-0.4)
+
+
+@pytest.mark.parametrize(("x", "vx", "blocks"), [(-0.6, 0.4, []), (0.6, 0.4, [1]), (0.6, -0.4, [1]), (-0.2, -0.4, [1])])
+def test_who_follows_is_not_in_the_way(x, vx, blocks):
+    """Behind the robot and on; ahead of it, on or back; beside it, back."""
+    moves = replace(known(x=x, vx=vx, motion=Motion.MOVING), course=(vx, 0.0))
+    assert [number for number, _ in found(moves)] == blocks
+
+
 def test_other_storeys_do_not_block():
     assert found(known(z=3.0)) == []
 
