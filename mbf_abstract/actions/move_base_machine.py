@@ -17,7 +17,7 @@ from mbf_abstract.execution.plan_check import area_in_global_frame, in_global_fr
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.goals.arrival_tolerance import planned_tolerance, tolerance_left
+from mbf_abstract.goals.arrival_tolerance import ends_beside, planned_tolerance, tolerance_left
 from mbf_abstract.goals.feedback_types import ExePathFeedback, MoveBaseFeedback
 from mbf_abstract.goals.goal_area import GoalArea
 from mbf_abstract.goals.goal_types import MoveBaseGoal
@@ -214,6 +214,12 @@ class MoveBaseMachine:
         left = None if goal.goal_area is not None else tolerance_left(self._dist_tolerance, off)
         return goal.dist_tolerance if left is None else left
 
+    def _how_far_off(self) -> str:
+        """What is added where the path, driven to its end, leads to farther from the target than the tolerance."""
+        path, is_area = self._followed, self._job.handle.goal.goal_area is not None
+        off = 0.0 if path is None or is_area else path[-1].distance_to(self._target)
+        return f"; its path {ends_beside(off, self._dist_tolerance)}" if off > self._dist_tolerance else ""
+
     @property
     def _dist_tolerance(self) -> float:
         """Arrival tolerance [m] of the goal, else the server's."""
@@ -241,7 +247,7 @@ class MoveBaseMachine:
         if self._state is MoveBaseState.STOPPING:
             return self._go_on_after_stop()
         if result.success:
-            return MoveBaseOutcome.SUCCESS, result.message
+            return MoveBaseOutcome.SUCCESS, result.message + self._how_far_off()
         if result.outcome in FATAL:
             return result.outcome, result.message
         self._goals.cancel_plan("following failed")

@@ -39,7 +39,11 @@ class NavigationParameters(ParameterModel):
         "has planner_patience to itself; after such a failure only this one is called again.",
     )
     plan_end_tolerance: float = parameter(
-        0.5, "How far a plan's ends may lie from start and goal, beside the goal's tolerance.", unit="m", ge=0.0
+        0.5,
+        "How far a plan's ends may lie from start and goal, beside the goal's tolerance; where a path ends farther off "
+        "than that tolerance, the message of its success names the distance.",
+        unit="m",
+        ge=0.0,
     )
     refiner_max_retries: int = parameter(
         0, "Further refiner calls after a failure; 0 = none, -1 = unlimited.", ge=-1, le=1000

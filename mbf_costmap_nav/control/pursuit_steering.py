@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from mbf_abstract.geometry import Twist, normalize_angle
-from mbf_abstract.maps.controllers.inertia import PLANNED, braking_distance, speed_on_path, stopping_speed
+from mbf_abstract.maps.controllers.inertia import PLANNED, braking_distance, speed_on_path, stopping_speed, within
 from mbf_abstract.maps.controllers.room_to_turn import off_course
 from mbf_costmap_nav.control.path_geometry import look_ahead_point
 from mbf_costmap_nav.control.path_handling import ControlCycle, to_base_frame
@@ -35,7 +35,8 @@ class PursuitSteering(RegulatedFollower):
         return off_course(math.atan2(carrot[1], carrot[0]), self._backward(cycle))
 
     def _turn(self, cycle: ControlCycle, angle: float) -> Twist:
-        return Twist.planar(wz=self.rotation_speed(angle, cycle.request.velocity.wz))
+        fastest = Twist.planar(wz=math.copysign(self.parameters.rotate_to_heading_vel, angle))
+        return Twist.planar(wz=self.rotation_speed(angle, self.goes_on_from(fastest, cycle.request.velocity).wz))
 
     def _carrot(self, cycle: ControlCycle) -> tuple[float, float]:
         """Look-ahead point in the base frame; past a cusp it lies straight on."""
@@ -73,8 +74,8 @@ class PursuitSteering(RegulatedFollower):
         on_arc = self.inertia.speed_on_arc(-curvature if backward else curvature, velocity.wz)
         regulated = min(regulated, self._stopping_speed(cycle), on_arc)
         wanted = -regulated if backward else regulated
-        change = p.acc_lim_x * p.period
-        speed = min(max(wanted, velocity.vx - change), velocity.vx + change)
+        begin = self.goes_on_from(Twist.planar(wanted, wz=wanted * curvature), velocity)
+        speed = within(wanted, begin.vx, p.acc_lim_x * p.period)
         if abs(speed * curvature) > p.max_vel_theta:
             speed = math.copysign(p.max_vel_theta / abs(curvature), speed)
         return Twist.planar(vx=speed, wz=speed * curvature)

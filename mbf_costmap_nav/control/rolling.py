@@ -13,7 +13,7 @@ import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.maps.controllers.end_of_path import swept_poses
-from mbf_abstract.maps.controllers.inertia import braking_distance
+from mbf_abstract.maps.controllers.inertia import braking_distance, within
 from mbf_abstract.maps.controllers.room_to_turn import CREEPING, SMALL_TURN, angle_to_path
 from mbf_costmap_nav.control.path_handling import ControlCycle
 from mbf_costmap_nav.control.pursuit_steering import PursuitSteering
@@ -80,7 +80,7 @@ class RollingPursuit(PursuitSteering):
 
     def _reachable(self, cycle: ControlCycle, command: Twist) -> Twist:
         """What a robot whose control period is stated can do of a command until the next one; others do all of it."""
-        return self.inertia.reachable(command, cycle.request.velocity, self.parameters.max_vel_theta)
+        return self.reachable(command, cycle.request.velocity, self.parameters.max_vel_theta)
 
     def _can_turn_where_it_stops(self, cycle: ControlCycle, backward: bool) -> bool:
         """Whether a robot that brakes straight on has to turn to its path there, and nothing is in the way."""
@@ -94,7 +94,7 @@ class RollingPursuit(PursuitSteering):
     def _slowed(self, motion: Twist, velocity: Twist) -> Twist:
         """The same arc as slowly as the robot can drive it by now; a wider one where that is too fast to turn."""
         change = self.parameters.acc_lim_x * self.parameters.period
-        speed = min(max(motion.vx, velocity.vx - change), velocity.vx + change)
+        speed = within(motion.vx, self.goes_on_from(motion, velocity).vx, change)
         most = self.parameters.max_vel_theta
         return Twist.planar(speed, wz=min(max(motion.wz / motion.vx * speed, -most), most))
 

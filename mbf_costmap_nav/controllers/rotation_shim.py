@@ -1,7 +1,8 @@
 """Rotation shim: turn in place towards a new path first, then let another controller drive.
 
 When to use: controllers that start a path with a wide arc or back up (MPPI, DWA) on robots that can turn in place in
-tight spaces. When not: ``costmap.regulated_pure_pursuit``, which turns by itself, and car-like robots.
+tight spaces. When not: ``costmap.regulated_pure_pursuit``, which turns by itself, and car-like robots. A robot that
+rolls brakes first.
 
 The inner controller is constructed here, on the same context, from its own parameter block: ``inner_type`` is a type as
 in the list of controllers, ``inner: {...}`` its parameters; both are checked with the rest of the configuration. There
@@ -14,16 +15,23 @@ import math
 from dataclasses import replace
 from typing import Any, ClassVar
 
+import numpy as np
+
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
-from mbf_abstract.maps.controllers.inertia import stopping_speed
+from mbf_abstract.maps.controllers.braking import LastFreeArc
+from mbf_abstract.maps.controllers.inertia import InertiaParameters, braking_distance, stopping_speed
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult, InnerPlugin, PluginKind
 from mbf_costmap_nav.control.path_handling import ControlCycle, PathFollower, to_base_frame
+from mbf_costmap_nav.control.rolling import rolled_poses
 from mbf_costmap_nav.planning.nav_core import wrap_nav_core
 from mbf_costmap_nav.plugins import CostmapContext
+
+STEP = 0.05
+"""Time [s] from pose to pose where it looks ahead."""
 
 
 class RotationShimParameters(PluginParameters):
@@ -39,6 +47,13 @@ class RotationShimParameters(PluginParameters):
     angular_done_threshold: float = parameter(0.3, "Aligned well enough to drive.", unit="rad", gt=0.0, le=3.2)
     forward_sampling_distance: float = parameter(0.5, "Path point to turn to.", unit="m", gt=0.0, le=10.0)
     rotate_to_heading_vel: float = parameter(1.2, "Yaw rate of the turn.", unit="rad/s", gt=0.0, le=20.0)
+    acc_lim_x: float | None = parameter(
+        None,
+        "Largest change of speed before the turn; absent = that of the inner controller, inf if it has none.",
+        unit="m/s^2",
+        gt=0.0,
+        allow_inf=True,
+    )
     acc_lim_theta: float = parameter(3.2, "Change of the yaw rate.", unit="rad/s^2", gt=0.0, le=100.0)
     control_period: float = parameter(0.05, "Time between two calls.", unit="s", gt=0.0, le=1.0)
 
@@ -60,7 +75,7 @@ class RotationShimController(PathFollower):
         self._inner: AbstractController = inner_class(
             replace(context, name=f"{self.name}.inner", parameters=parameters)
         )
-        self._aligning = False
+        self._aligning, self._last = False, LastFreeArc()
 
     @property
     def turns_on_the_spot(self) -> bool:
@@ -91,10 +106,13 @@ class RotationShimController(PathFollower):
             self.parameters.angular_done_threshold if self._turning(cycle) else self.parameters.angular_dist_threshold
         )
         self._aligning = self._aligning and abs(angle) > limit and not cycle.touches  # the inner one gets it out
-        command = self._rotation(angle, request.velocity.wz)
-        if not self._aligning or self._sweeps_obstacle(cycle, command):
-            return self._inner.compute_velocity_commands(request)
-        return ControlResult(ExePathOutcome.SUCCESS, "turning to the path", command)
+        command = self._rotation(angle, request.velocity)
+        if not self._aligning or self._sweeps_obstacle(cycle, angle, command):
+            result = self._inner.compute_velocity_commands(request)
+        else:
+            result = ControlResult(ExePathOutcome.SUCCESS, "turning to the path", command)
+        self._last.keep(result.command, self.clock.now())
+        return result
 
     def _turning(self, cycle: ControlCycle) -> bool:
         return abs(cycle.request.velocity.wz) > 1e-2 and abs(cycle.request.velocity.vx) < 1e-2
@@ -107,19 +125,32 @@ class RotationShimController(PathFollower):
             x, y = -x, -y
         return math.atan2(y, x) if math.hypot(x, y) > 1e-3 else 0.0
 
-    def _rotation(self, angle: float, speed: float) -> Twist:
-        p = self.parameters
-        change = p.acc_lim_theta * p.control_period
-        stopping = stopping_speed(abs(angle), p.acc_lim_theta, p.control_period)
-        wanted = math.copysign(min(p.rotate_to_heading_vel, stopping), angle)
-        return Twist.planar(wz=min(max(wanted, speed - change), speed + change))
+    @property
+    def _inertia(self) -> InertiaParameters:
+        """What is stated here, else what the inner controller goes by."""
+        p, known = self.parameters, getattr(self._inner.parameters, "acc_lim_x", None)
+        braking = next((one for one in (p.acc_lim_x, known) if one is not None), math.inf)
+        return InertiaParameters(acc_lim_x=braking, acc_lim_theta=p.acc_lim_theta, control_period=p.control_period)
 
-    def _sweeps_obstacle(self, cycle: ControlCycle, command: Twist) -> bool:
+    def _rotation(self, angle: float, measured: Twist) -> Twist:
+        """The turn by ``angle`` [rad], as far as the robot can take it up; one that rolls brakes straight on first."""
+        p = self.parameters
+        stopping = stopping_speed(abs(angle), p.acc_lim_theta, p.control_period)
+        wanted = Twist.planar(wz=math.copysign(min(p.rotate_to_heading_vel, stopping), angle))
+        return self._inertia.reachable(wanted, measured, begin=self._last.begins_at(wanted, measured, self.clock.now()))
+
+    def _sweeps_obstacle(self, cycle: ControlCycle, angle: float, command: Twist) -> bool:
         """Whether turning for another half second, or until it has braked, would touch a lethal cell.
 
-        Then the inner controller takes over.
+        A robot that rolls is looked at until it stands, and turns there. Where it touches something, the inner
+        controller takes over.
         """
-        p, pose = self.parameters, cycle.request.pose
-        duration = max(0.5, p.control_period + 0.5 * abs(command.wz) / p.acc_lim_theta)
-        poses = arc_poses((pose.x, pose.y, pose.yaw), 0.0, 0.0, command.wz, duration, 0.05)
-        return cycle.first_collision(poses) >= 0
+        p, pose, measured = self.parameters, cycle.request.pose, cycle.request.velocity
+        turn, rolled, limits = command.wz, np.array([(pose.x, pose.y, pose.yaw)]), self._inertia
+        if braking_distance(measured.vx, limits.acc_lim_x) > 0.0:
+            turn, now = math.copysign(p.rotate_to_heading_vel, angle), Twist.planar(wz=measured.wz)
+            times = {"duration": abs(measured.vx) / limits.acc_lim_x, "turning": 0.5 * abs(now.wz) / p.acc_lim_theta}
+            rolled, _ = rolled_poses(pose, measured.vx, now, limits.acc_lim_x, math.inf, step=STEP, **times)
+        duration = max(0.5, p.control_period + 0.5 * abs(turn) / p.acc_lim_theta)
+        turned = arc_poses(tuple(rolled[-1].tolist()), 0.0, 0.0, turn, duration, STEP)
+        return cycle.first_collision(np.concatenate([rolled, turned])) >= 0

@@ -18,7 +18,6 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to, in_robot_frame, poses_on_arc
 from mbf_abstract.geometry.arithmetic import norm, rotated
 from mbf_abstract.geometry.tangent_plane import heading_error
-from mbf_abstract.maps.controllers.braking import BrakesOnItsArc
 from mbf_abstract.maps.controllers.driving_out import Gears, LeavesContacts, OnPath
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_path
 from mbf_abstract.maps.controllers.inertia import PLANNED, InertiaParameters, speed_on_path, stopping_speed
@@ -28,7 +27,7 @@ from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.map.places import FORBIDDEN_COST
 from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, tracker_on_surface
-from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, KeepingFollower
+from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, SteeringFollower
 
 SHARES = (1.0, 0.5, 0.25)
 """Shares of the look-ahead that are tried where the arc to a point farther ahead cuts a corner that is not free."""
@@ -75,7 +74,7 @@ class PathFollowerParameters(InertiaParameters):
     )
 
 
-class PathFollower(LeavesContacts, BrakesOnItsArc, KeepingFollower):
+class PathFollower(LeavesContacts, SteeringFollower):
     """Pure pursuit on the surface."""
 
     Parameters = PathFollowerParameters
@@ -87,16 +86,6 @@ class PathFollower(LeavesContacts, BrakesOnItsArc, KeepingFollower):
         """To the end of the path that is checked, from a robot beside it."""
         ahead = parameters.check_ahead_dist
         return max(ahead + parameters.max_path_distance if ahead else 0.0, parameters.max_surface_distance)
-
-    @property
-    def inertia(self) -> InertiaParameters:
-        """As its parameters have it."""
-        return self.parameters
-
-    @property
-    def turns_on_the_spot(self) -> bool:
-        """Always true."""
-        return True
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose in the map's frame."""
@@ -221,4 +210,4 @@ class PathFollower(LeavesContacts, BrakesOnItsArc, KeepingFollower):
     def _reachable(self, motion: Twist) -> Twist:
         p = self.parameters
         command = Twist.planar(vx=motion.vx, wz=clamp(motion.wz, p.max_vel_theta))
-        return p.reachable(command, self._measured, p.max_vel_theta)
+        return self.reachable(command, self._measured, p.max_vel_theta)

@@ -18,7 +18,6 @@ import numpy as np
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm, rotated_back
 from mbf_abstract.geometry.tangent_plane import ground_distance, heading_error
-from mbf_abstract.maps.controllers.braking import BrakesOnItsArc
 from mbf_abstract.maps.controllers.failures import blocked_path
 from mbf_abstract.maps.controllers.inertia import PLANNED, InertiaParameters, speed_before_bends, stopping_speed
 from mbf_abstract.outcomes import ExePathOutcome
@@ -27,7 +26,7 @@ from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, tracker_on_surface
-from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, KeepingFollower
+from mbf_mesh_nav.motion.surface_follower import OBSTACLE_STEP, SteeringFollower
 from mbf_mesh_nav.motion.vector_field import VectorField
 
 STRAYING = 2.0
@@ -66,7 +65,7 @@ class VectorFieldParameters(InertiaParameters):
     )
 
 
-class VectorFieldController(BrakesOnItsArc, KeepingFollower):
+class VectorFieldController(SteeringFollower):
     """Follows the field of the plan it executes."""
 
     Parameters = VectorFieldParameters
@@ -74,16 +73,6 @@ class VectorFieldController(BrakesOnItsArc, KeepingFollower):
 
     _face = -1
     _measured = Twist()
-
-    @property
-    def inertia(self) -> InertiaParameters:
-        """As its parameters have it."""
-        return self.parameters
-
-    @property
-    def turns_on_the_spot(self) -> bool:
-        """Always true."""
-        return True
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path that brings its vector fields along; refuse others, and those of another mesh or frame."""
@@ -182,4 +171,4 @@ class VectorFieldController(BrakesOnItsArc, KeepingFollower):
     def _command(self, speed: float, turn: float) -> ControlResult:
         p = self.parameters
         command = Twist.planar(vx=speed, wz=clamp(turn, p.max_vel_theta))
-        return ControlResult(ExePathOutcome.SUCCESS, "", p.reachable(command, self._measured, p.max_vel_theta))
+        return ControlResult(ExePathOutcome.SUCCESS, "", self.reachable(command, self._measured, p.max_vel_theta))

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.maps.controllers.braking import BrakesOnItsArc, LastFreeArc
 from mbf_abstract.maps.controllers.failures import no_path, obstacle_text, outside_map
+from mbf_abstract.maps.controllers.inertia import InertiaParameters
 from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath
 from mbf_abstract.maps.controllers.motion_limits import MotionLimits
 from mbf_abstract.plugins import ControlRequest, ControlResult
@@ -73,17 +76,43 @@ class SurfaceFollower(MeshController):
 
 
 class KeepingFollower(SurfaceFollower):
-    """One that drives closely along its path where its own motions get the robot nowhere, or where it is tight."""
+    """One that drives closely along its path where its own motions get the robot nowhere."""
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
         self._keeping = KeepingToPath(context)
         self.parameters_changed()
 
+    def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
+        """As for all; whoever keeps to the path needs the tolerances, too."""
+        reached = self._keeping.update(pose, dist_tolerance, angle_tolerance)
+        return super().is_goal_reached(pose, dist_tolerance, angle_tolerance) or reached
+
+
+class SteeringFollower(KeepingFollower, BrakesOnItsArc):
+    """One that steers, on the spot, too; it drives closely along its path where it is stuck, or where that is tight."""
+
     def parameters_changed(self) -> None:
         """Take over new limits."""
         p: Any = self.parameters
         self._keeping.drive_with(p.max_vel_x, p.max_vel_theta, p, p, allow_reversing=False)
+
+    @property
+    def inertia(self) -> InertiaParameters:
+        """As its parameters have it."""
+        p: Any = self.parameters
+        assert isinstance(p, InertiaParameters)
+        return p
+
+    @cached_property
+    def last_arc(self) -> LastFreeArc:
+        """The arc of its last command, or of the last one along the path."""
+        return self._keeping.last_arc
+
+    @property
+    def turns_on_the_spot(self) -> bool:
+        """Always true."""
+        return True
 
     def closely(self, request: ControlRequest, fastest: float, *, is_stuck: bool = False) -> ControlResult | None:
         """The motion that keeps to the path where that is to be, see ``KeepingToPath``, at most ``fastest`` [m/s].
@@ -94,8 +123,3 @@ class KeepingFollower(SurfaceFollower):
         if p.acc_lim_x == math.inf:
             return None
         return self._keeping.closely(request, MotionLimits(0.0, fastest, p.max_vel_theta), is_stuck=is_stuck)
-
-    def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
-        """As for all; whoever keeps to the path needs the tolerances, too."""
-        reached = self._keeping.update(pose, dist_tolerance, angle_tolerance)
-        return super().is_goal_reached(pose, dist_tolerance, angle_tolerance) or reached

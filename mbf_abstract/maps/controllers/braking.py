@@ -78,16 +78,25 @@ class BrakesOnItsArc(AbstractController):
     def free_motion(self, request: ControlRequest) -> ControlResult:
         """The motion of this cycle, found free until the robot has stopped on its arc, or a refusal."""
 
+    def goes_on_from(self, command: Twist, measured: Twist) -> Twist:
+        """What a command is counted from, see ``LastFreeArc.begins_at``; of robots that follow what is measured."""
+        if self.inertia.follows_at_once:
+            return measured
+        return self.last_arc.begins_at(command, measured, self.clock.now())
+
+    def reachable(self, command: Twist, measured: Twist, turning: float) -> Twist:
+        """What the robot can do of a command until the next one, at most at a yaw rate [rad/s]; it keeps to the arc."""
+        return self.inertia.reachable(command, measured, turning, self.goes_on_from(command, measured))
+
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """Give the free motion, as far as the robot can do it until the next cycle, or brake along the last one."""
         result = self.free_motion(request)
         if not result.success:
             return self.last_arc.answer(result, request.velocity, self.inertia)
-        now = self.clock.now()
         if isinstance(result.command, Twist):
-            begin = self.last_arc.begins_at(result.command, request.velocity, now)
+            begin = self.goes_on_from(result.command, request.velocity)
             result = replace(result, command=self.inertia.reached(result.command, begin))
-        self.last_arc.keep(result.command, now)
+        self.last_arc.keep(result.command, self.clock.now())
         return result
 
 

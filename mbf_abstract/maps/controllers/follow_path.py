@@ -167,6 +167,9 @@ class FollowPath(LeavesContacts, SteeringToPath, BrakesOnItsArc):
         gap, turn = self._from_goal(pose, tracker)
         return tracker.has_arrived(dist_tolerance) and gap <= dist_tolerance and abs(turn) <= angle_tolerance
 
+    def _reachable(self, motion: Twist) -> Twist:
+        return self.reachable(motion, self._measured, self.parameters.max_vel_theta)
+
     def _motions(self, pose: Pose, tracker: PathTracker) -> list[Twist]:
         """A turn at a large heading error, or at the goal to its heading, else an arc; then what makes room for it."""
         return [self._reachable(motion) for motion in self._wanted(pose, tracker)]

@@ -47,6 +47,11 @@ class InertiaParameters(PluginParameters):
     control_period: float = parameter(0.05, "Time between two calls, for accelerations.", unit="s", gt=0.0, le=1.0)
 
     @property
+    def follows_at_once(self) -> bool:
+        """Whether nothing is stated."""
+        return self.acc_lim_x == self.acc_lim_theta == math.inf
+
+    @property
     def reaction_time(self) -> float:
         """Time [s] in which a robot goes on as before; 0 for one that follows at once."""
         return self.control_period if self.acc_lim_x < math.inf else 0.0
@@ -58,23 +63,26 @@ class InertiaParameters(PluginParameters):
         """
         return 1.5 * self.reaction_time + 0.5 * self.stops_after(motion)
 
-    def reachable(self, command: Twist, measured: Twist, turning: float = math.inf) -> Twist:
+    def reachable(
+        self, command: Twist, measured: Twist, turning: float = math.inf, begin: Twist | None = None
+    ) -> Twist:
         """What the robot can do of a command until the next one: an arc is kept, it brakes before a turn.
 
-        ``turning`` [rad/s] is its largest yaw rate.
+        ``turning`` [rad/s] is its largest yaw rate, ``begin`` what it goes on from; None = from what is measured.
         """
-        if self.acc_lim_x == self.acc_lim_theta == math.inf:
+        if self.follows_at_once:
             return command
         gain, turn_gain = self.acc_lim_x * self.control_period, self.acc_lim_theta * self.control_period
-        speed = within(command.vx, measured.vx, gain)
+        begin = measured if begin is None else begin
+        speed = within(command.vx, begin.vx, gain)
         turn = command.wz * speed / command.vx if command.vx != 0.0 else command.wz
-        if command.vx == 0.0 != command.wz and abs(speed) > CREEPING:
+        if command.vx == 0.0 != command.wz and abs(within(0.0, measured.vx, gain)) > CREEPING:
             turn = 0.0
-        return Twist.planar(speed, command.vy, within(within(turn, measured.wz, turn_gain), 0.0, turning))
+        return Twist.planar(speed, command.vy, within(within(turn, begin.wz, turn_gain), 0.0, turning))
 
     def reached(self, command: Twist, measured: Twist) -> Twist:
         """What a robot makes of a command until the next one, its speed and its turn each by itself."""
-        if self.acc_lim_x == self.acc_lim_theta == math.inf:
+        if self.follows_at_once:
             return command
         gain, turn_gain = self.acc_lim_x * self.control_period, self.acc_lim_theta * self.control_period
         return reached(command, measured, (gain, gain, turn_gain))

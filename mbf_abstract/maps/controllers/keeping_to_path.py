@@ -58,13 +58,18 @@ class KeepingToPath:
     def __init__(self, context: MapContext[Any]) -> None:
         self._follower = FollowPath(replace(context, name=f"{context.name}.path", parameters=FollowPathParameters()))
         self._standing = Standing()
-        self._last_arc, self._brakes_by = LastFreeArc(), InertiaParameters()
+        self._brakes_by = InertiaParameters()
         self._stood_at: Pose | None = None
         self._remained = self._horizon = math.inf
         self.is_keeping = False
         """Whether the last command was one along the path."""
         self.car: BrakesOnItsArc | None = None
         """What keeps a car to its path; None = nothing does."""
+
+    @property
+    def last_arc(self) -> LastFreeArc:
+        """The arc of the last command, whatever chose it."""
+        return self._follower.last_arc
 
     @property
     def is_leaving(self) -> bool:
@@ -123,7 +128,7 @@ class KeepingToPath:
         answer = self._follower.free_motion(request)
         if not answer.success or not isinstance(answer.command, Twist):
             return None
-        return replace(answer, command=limits.hold(answer.command, request.velocity))
+        return replace(answer, command=self._held(answer.command, request.velocity, limits))
 
     def out_of_contact(self, request: ControlRequest, limits: MotionLimits) -> ControlResult | None:
         """The answer that leads straight out of what the robot touches; None for a car, and where there is none."""
@@ -132,7 +137,7 @@ class KeepingToPath:
             return None
         self.is_keeping = True
         limits = replace(limits, slowest=min(limits.slowest, -CREEPING))
-        return ControlResult(ExePathOutcome.SUCCESS, "", limits.hold(out, request.velocity))
+        return ControlResult(ExePathOutcome.SUCCESS, "", self._held(out, request.velocity, limits))
 
     def choose(
         self,
@@ -191,14 +196,20 @@ class KeepingToPath:
     def _or_brake(self, result: ControlResult, measured: Twist, limits: MotionLimits) -> ControlResult:
         """An answer as far as the robot can do it until the next, or braking along its arc instead of a refusal."""
         if not result.success:
-            return self._last_arc.answer(result, measured, self._brakes_by)
-        now = self._follower.clock.now()
+            return self.last_arc.answer(result, measured, self._brakes_by)
         if isinstance(result.command, Twist):
-            # a car's curve is as tight as it can be driven from where the samples begin, which is what is measured
-            begin = measured if limits.is_car else self._last_arc.begins_at(result.command, measured, now)
+            begin = self._goes_on_from(result.command, measured, limits)
             result = replace(result, command=limits.reached(result.command, begin))
-        self._last_arc.keep(result.command, now)
+        self.last_arc.keep(result.command, self._follower.clock.now())
         return result
+
+    def _held(self, command: Twist, measured: Twist, limits: MotionLimits) -> Twist:
+        """The same arc within the limits."""
+        return limits.hold(command, self._goes_on_from(command, measured, limits))
+
+    def _goes_on_from(self, command: Twist, measured: Twist, limits: MotionLimits) -> Twist:
+        """What a command is counted from; of a car where its samples begin, whose curve is as tight as can be."""
+        return measured if limits.is_car else self.last_arc.begins_at(command, measured, self._follower.clock.now())
 
     def _has_stood(self, pose: Pose, stands_now: bool) -> bool:
         """Whether the robot stands, or has not come away yet from where it did.
@@ -226,7 +237,7 @@ class KeepingToPath:
         answer = follower.free_motion(request)
         if not isinstance(answer.command, Twist) or not answer.success:
             return None, answer.message
-        command = limits.hold(answer.command, request.velocity)
+        command = self._held(answer.command, request.velocity, limits)
         if not accepts(command):
             return None, "it costs too much"
         if around.anybody:

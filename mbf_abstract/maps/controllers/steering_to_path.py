@@ -76,9 +76,6 @@ class SteeringToPath(MapPlugin):
         rate = max(-p.max_vel_theta, min(p.turn_gain * angle, p.max_vel_theta))
         return Twist.planar(wz=p.turn_rate(rate, angle))
 
-    def _reachable(self, motion: Twist) -> Twist:
-        return self.parameters.reachable(motion, self._measured, self.parameters.max_vel_theta)
-
     @property
     def _rolls_on(self) -> float:
         """Length [m] that the robot rolls until it creeps."""

@@ -241,6 +241,40 @@ def test_the_shim_aligns_again_for_a_new_path(shim):
     assert command_at(shim, math.pi / 2).vx == 0.0
 
 
+ALONG_Y = Path.from_points([(1.0, y, 0.0) for y in np.linspace(1.0, 4.0, 61)])
+
+
+def braking_shim(make_plugin, costmap, **parameters):
+    """A shim, and one cycle of a robot that does as it is commanded, its path leading to its left."""
+    inner = {"acc_lim_x": 0.5, "max_vel_x": 0.6}
+    shim = make_plugin(RotationShimController, costmap, inner_type="regulated_pure_pursuit", inner=inner, **parameters)
+    assert shim.set_plan(ALONG_Y)
+    return shim
+
+
+@pytest.mark.parametrize("stated", [{}, {"acc_lim_x": 0.5}], ids=["of the inner one", "its own"])
+def test_the_shim_brakes_a_robot_that_rolls_before_it_turns_it(make_plugin, stated):
+    shim, x, velocity, speeds = braking_shim(make_plugin, FREE, **stated), 1.0, Twist.planar(0.6), []
+    for _ in range(40):
+        command = shim.compute_velocity_commands(ControlRequest(Pose.planar(x, 1.0), velocity)).command
+        assert (
+            command.vx == pytest.approx(max(velocity.vx - 0.025, 0.0)) and abs(command.wz - velocity.wz) <= 0.16 + 1e-9
+        )
+        assert command.wz == 0.0 or command.vx <= 0.1 + 1e-9
+        velocity, x = command, x + 0.05 * command.vx
+        speeds.append(command.vx)
+    assert speeds[-1] == 0.0 and velocity.wz > 1.0
+
+
+def test_the_shim_leaves_a_robot_that_rolls_to_the_inner_controller_where_it_would_brake_into_something(make_plugin):
+    cells = np.zeros((100, 100), dtype=np.uint8)
+    cells[:, 32:] = 254  # 0.4 m ahead of the outline
+    beside_wall = braking_shim(make_plugin, Costmap(cells, 0.05))
+    rolling = ControlRequest(Pose.planar(1.0, 1.0), Twist.planar(0.8))
+    assert beside_wall.compute_velocity_commands(rolling).message != "turning to the path"
+    assert braking_shim(make_plugin, FREE).compute_velocity_commands(rolling).message == "turning to the path"
+
+
 def test_the_shim_refuses_unknown_parameters_of_the_inner_controller(make_plugin):
     with pytest.raises(ValueError, match="no_such"):
         make_plugin(RotationShimController, FREE, inner={"no_such": 1})

@@ -55,6 +55,18 @@ def test_without_tolerances_of_the_goal_those_of_the_server_reach_the_planner(ma
     assert (request.dist_tolerance, request.angle_tolerance) == (planned_tolerance(0.4), 0.5)
 
 
+@pytest.mark.parametrize(
+    ("short", "message"),
+    [(0.05, "goal reached"), (0.4, "goal reached; its path ends 0.40 m from the goal (tolerance 0.10 m)")],
+)
+def test_a_path_that_ends_farther_off_than_the_tolerance_is_a_success_that_says_so(make_session, short, message):
+    session = make_session(dist_tolerance=0.1, plan_end_tolerance=0.5)
+    session.planner.play(lambda asked: straight_plan(replace(asked, goal=Pose.planar(2.0 - short, 0.0))))
+    result = session.send().wait()
+    assert (result.outcome, result.message) == (Outcome.SUCCESS, message)
+    assert result.dist_to_goal == pytest.approx(short, abs=0.11)
+
+
 def test_a_path_as_short_of_the_target_as_the_planner_may_end_it_leads_to_within_the_tolerance(make_session):
     session = make_session(dist_tolerance=0.4)
     session.planner.play(lambda asked: straight_plan(replace(asked, goal=Pose.planar(2.0 - asked.dist_tolerance, 0.0))))
