@@ -23,7 +23,7 @@ from mbf_abstract.goals.goal_area import GoalArea
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.goals.result_types import GetPathResult, RefinePathResult
-from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
+from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome, RefinePathOutcome
 from mbf_abstract.server.plugin_table import PluginTable
 from mbf_abstract.time.clock import Stopwatch
 
@@ -56,6 +56,7 @@ class MoveBaseMachine:
         self._state = MoveBaseState.GET_PATH
         self._goals = SubGoals(sub_actions, job, area)
         self._followed: Path | None = None
+        self._unrefined = ""  # what is said of the refiner that failed on the followed plan by a fault
         self._failure: tuple[Trigger, End] | None = None
         self._ending: End | None = None
         self._recoveries = RecoverySequence(self._runtime, plugins)
@@ -127,6 +128,8 @@ class MoveBaseMachine:
 
     def _on_plan(self, result: Any) -> End | None:
         if isinstance(result, RefinePathResult) and result.refined_path is not None:  # the plan itself without success
+            is_faulty = result.outcome == RefinePathOutcome.INTERNAL_ERROR
+            self._unrefined = f"; its plan was not refined: {result.message}" if is_faulty else ""
             self._follow_path(result.refined_path)
             return None
         if result.success and result.path is not None:
@@ -247,7 +250,7 @@ class MoveBaseMachine:
         if self._state is MoveBaseState.STOPPING:
             return self._go_on_after_stop()
         if result.success:
-            return MoveBaseOutcome.SUCCESS, result.message + self._how_far_off()
+            return MoveBaseOutcome.SUCCESS, result.message + self._how_far_off() + self._unrefined
         if result.outcome in FATAL:
             return result.outcome, result.message
         self._goals.cancel_plan("following failed")

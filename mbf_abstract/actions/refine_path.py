@@ -10,6 +10,7 @@ from mbf_abstract.actions.plugin_action import PluginAction
 from mbf_abstract.execution.plan_check import leaves_map
 from mbf_abstract.execution.refiner import RefinerExecution
 from mbf_abstract.geometry import Path
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.feedback_types import NoFeedback
 from mbf_abstract.goals.goal_types import RefinePathGoal
 from mbf_abstract.goals.handle import GoalHandle
@@ -51,7 +52,7 @@ class RefinePathAction(PluginAction[RefinePathGoal, RefinePathResult, NoFeedback
         run = self._supervise(job, plugin)
         with run, run.map_in_use():
             result = RefinerExecution(run, handle.goal.path).execute()
-            # 3. Refuse a path that leaves the map, else measure what changed.
+            # 3. Refuse a path that leaves the map or leads elsewhere, else measure what changed.
             judge = partial(self._measured, result, handle.goal.path, plugin.name)
             return run.call_beside("the map's path_problem()", judge)
 
@@ -61,6 +62,9 @@ class RefinePathAction(PluginAction[RefinePathGoal, RefinePathResult, NoFeedback
         refined = result.path
         if refined is None or len(refined) == 0:
             text = f"refiner {refiner!r} reported success but gave no poses"
+            return RefinePathResult(RefinePathOutcome.INTERNAL_ERROR, text, refined_path=original, refiner=refiner)
+        if refined is not original and (problem := self._elsewhere(refined, original)):
+            text = f"the path of refiner {refiner!r} is refused: {problem}"
             return RefinePathResult(RefinePathOutcome.INTERNAL_ERROR, text, refined_path=original, refiner=refiner)
         if refined is not original and (problem := leaves_map(refined, self.runtime)):
             outcome, text = RefinePathOutcome.INTERNAL_ERROR, f"the path of refiner {refiner!r} is refused: {problem}"
@@ -76,6 +80,18 @@ class RefinePathAction(PluginAction[RefinePathGoal, RefinePathResult, NoFeedback
             path_length_ratio=refined.length / original.length if original.length > 0.0 else 1.0,
             refiner=refiner,
         )
+
+    def _elsewhere(self, refined: Path, original: Path) -> str:
+        """Which end of a refined path lies elsewhere than that of the path; empty if none does."""
+        allowed = self.runtime.parameters.plan_end_tolerance
+        try:
+            there = self.runtime.transforms.transform_path(refined, original.frame_id)
+        except TransformError as error:
+            return str(error)
+        for name, index in (("begins", 0), ("ends", -1)):
+            if (off := there[index].distance_to(original[index])) > allowed:
+                return f"it {name} {off:.2f} m from where the plan {name}, allowed {allowed:.2f} m"
+        return ""
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> RefinePathResult:
         """Result with the path as it was."""

@@ -52,6 +52,8 @@ SAME_KIND: dict[int, int] = {ExePathOutcome.COLLISION: ExePathOutcome.BLOCKED_PA
 """Failures that count as others: whether a blocked robot touches what is in its way may change by a centimetre."""
 NOWHERE = frozenset([ExePathOutcome.OSCILLATION, MoveBaseOutcome.OSCILLATION])
 """Failures of a robot that drives and gets nowhere."""
+FAULTY = frozenset([RecoveryOutcome.INTERNAL_ERROR, RecoveryOutcome.PAT_EXCEEDED])
+"""How behaviours end that raise, answer something else, or do not come back."""
 
 
 @dataclass
@@ -225,10 +227,9 @@ class StuckMonitor:
         return self._escalation[spot.escalations - 1]
 
     def described(self, message: str) -> str:
-        """Return the message of a failure, with place and attempts if the robot is stuck; attempts if one raised."""
+        """Return the message of a failure, with place and attempts of a robot that is stuck, or attempts at fault."""
         if (spot := self._present) is None:
             return message
         if self.stuck:
             return f"{message}; {spot}"
-        is_faulty = RecoveryOutcome.INTERNAL_ERROR in spot.tried.values()
-        return f"{message}; {spot.attempts}" if is_faulty else message
+        return message if FAULTY.isdisjoint(spot.tried.values()) else f"{message}; {spot.attempts}"

@@ -9,6 +9,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import PlanResult
+from mbf_abstract.testing.faulty import Hang
 from mbf_abstract.testing.scripted_session import ScriptedSession
 
 BLOCKED, COLLISION, MISSED = ExePathOutcome.BLOCKED_PATH, ExePathOutcome.COLLISION, ExePathOutcome.MISSED_PATH
@@ -45,12 +46,15 @@ def stand():
         session.close()
 
 
-def test_a_recovery_that_raises_is_named_at_the_end_of_its_goal():
-    with ScriptedSession(planner_max_retries=0) as session:
+@pytest.mark.parametrize("end", ["INTERNAL_ERROR", "PAT_EXCEEDED"])
+def test_a_recovery_that_raises_or_hangs_is_named_at_the_end_of_its_goal(end):
+    with ScriptedSession(planner_max_retries=0, recovery_patience=1.0) as session:
+        hang = Hang(session.clock)
         session.planner.play(PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in"))
-        session.recovery.play(ValueError("no idea"))
+        session.recovery.play(hang if end == "PAT_EXCEEDED" else ValueError("no idea"))
         result = session.navigator.go_to(Pose.planar(3.0, 0.0))
-    assert result.message == "walled in; tried recovery (INTERNAL_ERROR)"
+        hang.release()
+    assert result.message == f"walled in; tried recovery ({end})"
 
 
 def test_the_third_failure_of_one_kind_at_one_place_is_one_too_many(stand):

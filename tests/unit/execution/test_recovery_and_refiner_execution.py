@@ -274,6 +274,25 @@ def test_a_refiner_that_succeeds_without_poses_is_an_internal_error(make_session
     assert session.navigator.refine_path(BENT).outcome == RefinePathOutcome.INTERNAL_ERROR
 
 
+@pytest.mark.parametrize(
+    ("points", "frame", "message"),
+    [
+        ([(0, 0, 0), (1, 0, 0)], "map", "it ends 1.00 m from where the plan ends, allowed 0.50 m"),
+        ([(0, -0.6, 0), (2, 0, 0)], "map", "it begins 0.60 m from where the plan begins, allowed 0.50 m"),
+        ([(0, 0, -3), (2, 0, -3)], "map", "it begins 3.00 m from where the plan begins, allowed 0.50 m"),
+        ([(0, 0, 0), (2, 0, 0)], "nowhere", "no transform from 'nowhere' to 'map'"),
+    ],
+)
+def test_a_refined_path_that_leads_elsewhere_is_refused_by_the_name_of_its_refiner(
+    make_session, points, frame, message
+):
+    session = make_session(plan_end_tolerance=0.5)
+    session.refiner.play(RefineResult(0, "done", Path.from_points(points, frame_id=frame)))
+    result = session.navigator.refine_path(BENT)
+    assert (result.outcome, result.refined_path) == (RefinePathOutcome.INTERNAL_ERROR, BENT)
+    assert f"the path of refiner 'refiner' is refused: {message}" in result.message
+
+
 def test_a_canceled_refiner_ends_canceled(make_session):
     session = make_session()
     session.refiner.play(slow(session.clock, 0.5, RefineResult(0, "", STRAIGHT)))

@@ -52,6 +52,15 @@ def test_the_refined_path_is_followed(make_refining):
     assert farthest_left(session) > 0.2
 
 
+def test_a_refiner_that_raises_is_named_at_the_end_of_a_goal_that_succeeds_without_it(make_refining):
+    session = make_refining()
+    session.refiner.play(ValueError("no idea"))
+    raised = "plugin 'refiner' raised ValueError in apply_refinement: no idea"
+    assert session.send().wait().message == f"goal reached; its plan was not refined: {raised}"
+    session.refiner.play(over_a_corner)
+    assert session.send(0.0).wait().message == "goal reached"
+
+
 def test_a_plan_that_cannot_be_refined_is_followed_as_it_is(make_refining):
     session = make_refining()
     session.refiner.play(RefineResult(RefinePathOutcome.FAILURE, "too rough"))
