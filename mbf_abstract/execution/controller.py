@@ -263,7 +263,9 @@ class ControllerExecution:
         except PluginNonFinite as error:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, str(error))
         if result.success and result.command is None:
-            result = ControlResult(ExePathOutcome.NO_VALID_CMD, "the controller reported success but gave no command")
+            result = ControlResult(
+                ExePathOutcome.NO_VALID_CMD, f"{self._run.plugin.title} gave no command with its success"
+            )
         elif result.success:
             result = self._avoid_contact(pose, self._runtime.velocity_or_command(measured), result)
         self.last_result = result

@@ -46,7 +46,8 @@ def sweep(
     """Run a scenario with many seeds and variants: tables, medians with their spread, tests, figures.
 
     With several variants each pair of them is tested seed by seed, in success and in every metric; p is corrected
-    for the number of all these tests (Holm).
+    for the number of all these tests (Holm). Exit code 0 once all runs are done, whatever became of them; 2 if no
+    setting lets any begin.
     """
     with readable_errors(out):
         from rich.console import Console
@@ -87,6 +88,8 @@ def sweep(
         _print_tables(console, rows)
         names = ", ".join(file.name for file in files)
         console.print(f"results in {out}: {names}", soft_wrap=True, markup=False)
+        if all(row.get("refused") for row in rows):
+            raise typer.Exit(2)
 
 
 def _print_verdict(console: Console, run: SweepRun, metrics: Mapping[str, Any]) -> None:
@@ -132,7 +135,10 @@ def parse_settings(texts: list[str]) -> dict[str, list[str]]:
     settings: dict[str, list[str]] = {}
     for text in texts:
         key, _, values = text.partition("=")
-        if not key or not all(values.split(",")):
-            raise typer.BadParameter(f"expected KEY=VALUE,VALUE, got {text!r}", param_hint="--set")
-        settings[key] = values.split(",")
+        parts = values.split(",")
+        if not key or not all(parts) or len(set(parts)) < len(parts):
+            raise typer.BadParameter(f"expected KEY=VALUE,VALUE, each value once, got {text!r}", param_hint="--set")
+        if key in settings:
+            raise typer.BadParameter(f"expected each key once, with all its values, got {text!r}", param_hint="--set")
+        settings[key] = parts
     return settings

@@ -156,5 +156,13 @@ def test_settings_that_look_like_markup_neither_break_the_table_nor_vanish(argum
 
     finished = subprocess.run(arguments, capture_output=True, text=True, env={**os.environ, "COLUMNS": "200"})
 
-    assert (finished.returncode, finished.stderr) == (0, "")
+    assert (finished.returncode, finished.stderr) == (2, "")
     assert finished.stdout.count("planner=[/x]") == finished.stdout.count("planner=[red]") == 2
+
+
+@pytest.mark.parametrize(("planners", "code"), [("dijkstra,astarr", 0), ("astarr", 2)])
+def test_a_sweep_of_which_no_run_could_begin_ends_with_2(arguments, tmp_path, planners, code):
+    given = [f"planner={planners}" if one.startswith("planner=") else one for one in arguments]
+    done = subprocess.run(given, capture_output=True, text=True)
+    assert done.returncode == code, done.stderr
+    assert "refused with every seed" in done.stdout and "did you mean 'astar'" in done.stdout

@@ -161,9 +161,9 @@ def test_both_directions_of_an_omnidirectional_robot_change_together(make_plugin
         "vx_std": 0.6,
         "vy_std": 0.6,
     }
-    controller = make_plugin(MPPIController, Costmap(cells, 0.05, -5.0, -5.0), **model)
-    controller.set_plan(Path.from_points([(x, 0.02, 0.0) for x in np.linspace(0.0, 2.0, 21)]))
     for measured in (Twist.planar(0.2, 0.4), Twist.planar(0.0, -0.3, 0.5), Twist.planar(0.5)):
+        controller = make_plugin(MPPIController, Costmap(cells, 0.05, -5.0, -5.0), **model)
+        controller.set_plan(Path.from_points([(x, 0.02, 0.0) for x in np.linspace(0.0, 2.0, 21)]))
         command = controller.compute_velocity_commands(ControlRequest(Pose.planar(0.0, 0.02), measured)).command
         gains = (command.vx - measured.vx) / (2.0 * 0.05), (command.vy - measured.vy) / (1.0 * 0.05)
         assert math.hypot(*gains) <= 1.0 + 1e-5

@@ -250,7 +250,14 @@ def test_nonsense_for_seeds_is_refused(text):
 
 def test_settings_list_their_values_and_nonsense_is_refused():
     assert parse_settings(["planner=cvp,astar", "a.b=1"]) == {"planner": ["cvp", "astar"], "a.b": ["1"]}
-    for text in ("planner", "=1", "planner=", "planner=a,"):
-        with pytest.raises(typer.BadParameter) as refused:
-            parse_settings([text])
+    for *texts, message in (
+        ("planner", "each value once, got 'planner'"),
+        ("=1", "each value once"),
+        ("planner=", "each value once"),
+        ("planner=a,", "each value once"),
+        ("planner=a,b,a", "each value once, got 'planner=a,b,a'"),
+        ("planner=a", "planner=b", "each key once, with all its values, got 'planner=b'"),
+    ):
+        with pytest.raises(typer.BadParameter, match=message) as refused:
+            parse_settings(texts)
         assert refused.value.param_hint == "--set"
