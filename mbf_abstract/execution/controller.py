@@ -263,9 +263,7 @@ class ControllerExecution:
         except PluginNonFinite as error:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, str(error))
         if result.success and result.command is None:
-            result = ControlResult(
-                ExePathOutcome.NO_VALID_CMD, f"{self._run.plugin.title} gave no command with its success"
-            )
+            result = ControlResult(ExePathOutcome.NO_VALID_CMD, f"{self._run.plugin.title} gave no command")
         elif result.success:
             result = self._avoid_contact(pose, self._runtime.velocity_or_command(measured), result)
         self.last_result = result
@@ -329,7 +327,7 @@ class ControllerExecution:
 
     def _patience_end(self) -> ControllerEnd:
         last = self.last_result.message if self.last_result is not None else ""
-        tail = f"; last message of the controller: {last}" if last else ""
+        tail = f"; last message of {self._run.plugin.title}: {last}" if last else ""
         text = f"no valid command for {self._run.patience:g} s{tail}"
         return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, text)
 

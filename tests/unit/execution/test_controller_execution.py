@@ -134,7 +134,7 @@ def test_f285_a_failure_after_patience_is_patience_exceeded(make_session, states
     result = session.navigator.exe_path(session.path_to(5.0))
     assert end_state(states, session) == "pat_exceeded"
     assert result.outcome == Outcome.PAT_EXCEEDED
-    assert result.message == "no valid command for 1 s; last message of the controller: a chair"
+    assert result.message == "no valid command for 1 s; last message of controller 'controller': a chair"
     assert (result.plugin_outcome, result.plugin_message) == (Outcome.BLOCKED_PATH, "a chair")
 
 
