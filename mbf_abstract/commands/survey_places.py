@@ -40,9 +40,11 @@ def refuse_elsewhere(survey: Survey, config: Path, **places: Place) -> None:
 def _hint(survey: Survey, place: Place) -> str:
     """What may be meant by a place that is far from the map."""
     in_degrees = abs(place.x) <= 180.0 and abs(place.y) <= 90.0
+    swapped = float(norm(survey.to_map(place.y, place.x))) <= FARTHEST
     if survey.units[1] > DEGREES:
-        swapped = float(norm(survey.to_map(place.y, place.x))) <= FARTHEST
         return "longitude comes before latitude" if swapped else "this map takes degrees: LON LAT"
+    if swapped:
+        return "easting comes before northing"
     if not in_degrees:
         return ""
     hint = "degrees have to be transformed into the coordinates of the survey"

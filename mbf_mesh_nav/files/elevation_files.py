@@ -57,7 +57,7 @@ def read_elevation(path: Path, max_faces: int) -> tuple[FloatArray, NDArray[np.i
     except MeshError:
         raise
     except Exception as error:  # whatever the reader of another package raises
-        reason = str(error).removeprefix(f"{path}: ")
+        reason = str(error).removeprefix(f"{path}: ").removeprefix("cannot be read: ")
         raise MeshError(str(path), [f"cannot be read as an elevation model: {reason}"]) from error
     return vertices, faces.astype(np.int64)
 

@@ -175,7 +175,9 @@ def _read_esri_ascii(path: Path, max_samples: int) -> Elevation:
     header = read_header(path)
     missing = [key for key in ("ncols", "nrows", "cellsize") if key not in header]
     if missing:
-        raise TerrainFileError(path, f"expected {', '.join(missing)} in the header, got none")
+        raise TerrainFileError(path, f"expected {', '.join(missing)} in the header, got {', '.join(header) or 'none'}")
+    if not header["cellsize"] > 0.0:
+        raise TerrainFileError(path, f"expected a cellsize above 0 in the header, got {header['cellsize']:g}")
     shape = int(header["nrows"]), int(header["ncols"])
     _refuse_size(path, *shape, max_samples)
     if path.stat().st_size > MAX_ASCII_BYTES_PER_SAMPLE * (shape[0] * shape[1] + len(header)):

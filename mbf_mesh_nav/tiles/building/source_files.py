@@ -52,7 +52,7 @@ def open_source(path: Path, parameters: MeshMapParameters, spacing: float = 0.0)
             heights, dx, dy = read(path, MAX_HEIGHTS)
             return HeightSource(np.asarray(heights, dtype=np.float32), dx, dy)
         except Exception as error:  # whatever the reader of another package raises
-            reason = str(error).removeprefix(f"{path}: ")
+            reason = str(error).removeprefix(f"{path}: ").removeprefix("cannot be read: ")
             raise MeshError(str(path), [f"cannot be read as an elevation model: {reason}"]) from error
     part, up_axis, unit = parameters.mesh_part, parameters.up_axis, parameters.unit
     vertices, faces = read_mesh(path, part, parameters.max_faces, up_axis=up_axis, unit=unit)

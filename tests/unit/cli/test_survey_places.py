@@ -22,6 +22,7 @@ ESRI = "ncols 3\nnrows 3\nxllcorner 500000\nyllcorner 5400000\ncellsize 1\n" + "
     [
         (UTM, (-118.2, 34.3), "Transformer.from_crs(4326, 'EPSG:32611', always_xy=True).transform(-118.2, 34.3)"),
         (UTM, (0.0, 9e6), ""),
+        (UTM, (3788650.0, 376330.0), "easting comes before northing"),
         (UNKNOWN, (-118.2, 34.3), "degrees have to be transformed into the coordinates of the survey"),
         (DEGREES, (44.3, -71.5), "longitude comes before latitude"),
         (DEGREES, (376328.0, 3788642.0), "this map takes degrees: LON LAT"),

@@ -101,8 +101,10 @@ def test_an_elevation_model_is_a_mesh_whose_voids_are_holes(tmp_path, ending):
         (
             "a.asc",
             "ncols 3\nnrows 2\n1 2 3 4 5 6\n",
-            "cannot be read as an elevation model: expected cellsize in the header, got none",
+            "cannot be read as an elevation model: expected cellsize in the header, got ncols, nrows",
         ),
+        ("a.asc", "ncols 2\nnrows 2\ncellsize -1\n1 2 3 4\n", "expected a cellsize above 0 in the header, got -1"),
+        ("a.asc", "ncols 2\nnrows 2\ncellsize 1\n1 2\n3 x\n", "an elevation model: line 5: expected heights"),
         ("a.asc", "ncols 2\nnrows 2\ncellsize 1\nnodata_value 0\n0 0 0 0\n", "got 2 x 2 voids"),
         ("a.tif", "no tiff", "cannot be read"),
         ("a.npz", "no zip", "cannot be read"),
