@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import typer
@@ -19,6 +20,9 @@ TOKEN = typer.Option(
 READ_ONLY = typer.Option(False, "--foxglove-read-only", help="Watching only, no steering.")
 ORIGIN = typer.Option([], "--foxglove-origin", help="Origin of another web app that may connect; repeatable.")
 
+IS_ORIGIN = r"[A-Za-z][\w+.-]*://[^/]*"
+"""A scheme and a host, without a path."""
+
 
 def foxglove_of(context: typer.Context) -> FoxgloveOptions | None:
     """Return what these options of a command ask for, None without ``--foxglove``; raises ValueError."""
@@ -29,6 +33,10 @@ def foxglove_of(context: typer.Context) -> FoxgloveOptions | None:
     from mbf_abstract.access.foxglove import FoxgloveOptions, parsed_address
 
     token, read_only, origins = (given[f"foxglove_{name}"] for name in ("token", "read_only", "origin"))
+    for origin in origins:
+        if not re.fullmatch(IS_ORIGIN, origin):
+            text = f"expected an origin as a browser sends it, such as http://localhost:8080, got {origin!r}"
+            raise typer.BadParameter(text, param_hint="--foxglove-origin")
     return FoxgloveOptions(*parsed_address(given["foxglove_at"]), token, read_only, tuple(origins))
 
 

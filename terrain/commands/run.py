@@ -113,6 +113,8 @@ def run(
     chosen = settings_of(settings, planner=planner, controller=controller)
     if not ros2:
         refuse_without(context, "--ros2", "ros2_stamped", "ros2_lockstep", "ros2_patience")
+    if not view:
+        refuse_without(context, "--view", "view_port", "view_host", "view_token", "view_read_only")
     folder = out or new_run_folder(RUNS, datetime.now())
     with readable_errors(folder):
         from terrain.commands.live_line import LiveLine
