@@ -26,6 +26,7 @@ WIDTH_OF_LETTER = 0.055  # [inch], of the names at box plots
 BESIDE = 0.25  # of the least step of a difficulty, for all curves together
 FEWEST_STEPS = 8  # of an axis, for this distance
 MOST_TICKS = 12  # values of a difficulty that are all named at its axis
+MOST_NUMBERS = 4  # steps of a box plot's axis, whose numbers may have six digits
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#b8a800")
 """Distinct for colour-blind people, too (Okabe and Ito 2008); the last one darker, for white paper."""
 
@@ -85,6 +86,7 @@ def _draw_boxes(figure: Any, variants: Mapping[str, Sequence[Row]]) -> bool:
                 _draw_box(panel, place, of_variant, colour)
         panel.set_yticks(list(places), names if number % columns == 0 else [""] * len(names), fontsize=7)
         panel.set_xlabel(metric.title)
+        panel.locator_params(axis="x", nbins=MOST_NUMBERS)
         panel.spines[["top", "right"]].set_visible(False)
     return True
 
