@@ -16,12 +16,12 @@ drives the manoeuvre back. Where there is no such place it ends with IMPASSABLE 
 
 Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
 goes first waits until the others have left its path; the others pull out, also off the path that the first one has
-announced, and wait until it has passed. Both wait while the others move, and ``longest_wait`` longer, but not more than
-``MOST_WAITS`` times as long in all. One that finds no place, or does not get there, announces that, and then goes
-first. One that goes first and has waited in vain announces that, too: then the others go first, and it pulls out
-itself. Robots that stand without a goal in its way are asked to pull out and waited for; run by such a robot,
-``give_way`` only pulls out (see ``server.making_room``). In the end the maps forget what they keep of places where the
-others stood and have left.
+announced, and wait until it has passed. Both wait while the others move, and ``longest_wait`` longer; for others that
+come to no new place not more than ``MOST_WAITS`` times as long in all, so a slow one has the time that it takes. One
+that finds no place, or does not get there, announces that, and then goes first. One that goes first and has waited in
+vain announces that, too: then the others go first, and it pulls out itself. Robots that stand without a goal in its way
+are asked to pull out and waited for; run by such a robot, ``give_way`` only pulls out (see ``server.making_room``). In
+the end the maps forget what they keep of places where the others stood and have left.
 
 The server's ``recovery_patience`` must leave time for drive and wait.
 """
@@ -33,6 +33,8 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import ClassVar
+
+import numpy as np
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import FloatArray, Pose, Twist
@@ -49,7 +51,7 @@ from mbf_abstract.traffic.right_of_way import right_of_way
 
 WAIT_PERIOD = 0.5  # s between two looks at where the other robots are
 MOVED = 0.2  # m, of another robot that does not stand
-MOST_WAITS = 3.0  # times longest_wait, for robots that move again and again
+MOST_WAITS = 3.0  # times longest_wait, for robots that move again and again and come to no new place
 NOT_THERE = frozenset([RecoveryOutcome.IMPASSABLE, RecoveryOutcome.PAT_EXCEEDED])
 """How it ends to find no place, or not to get there."""
 
@@ -61,8 +63,8 @@ class GiveWayParameters(PullingOutParameters):
     random_extra: float = parameter(3.0, "Stand up to this much longer, by chance.", unit="s", ge=0.0, le=600.0)
     longest_wait: float = parameter(
         8.0,
-        "How long to wait for robots that announce where they go and stand; also for those that move, at most three "
-        "times as long in all.",
+        "How long to wait for robots that announce where they go and stand; three times as long for those that move to "
+        "and fro, as long as it takes for those that come on.",
         unit="s",
         ge=0.0,
         le=600.0,
@@ -178,8 +180,9 @@ class GiveWayRecovery(PullingOutRecovery):
         """Stand until none of these robots blocks it, or the turn is another's, or they stand for too long."""
         names, begun = {rival.name for rival in rivals}, self.clock.now()
         went_before = {rival.name for rival in self._before(rivals)}
-        places, moved, longest = {rival.name: rival.path[0] for rival in rivals}, begun, self.parameters.longest_wait
-        while self.clock.now() < min(moved + longest, begun + MOST_WAITS * longest):
+        been, longest = {rival.name: [rival.path[0]] for rival in rivals}, self.parameters.longest_wait
+        moved = came_on = begun
+        while self.clock.now() < min(moved + longest, came_on + MOST_WAITS * longest):
             result = stand(request, WAIT_PERIOD)
             if not result.success:
                 return result
@@ -187,8 +190,11 @@ class GiveWayRecovery(PullingOutRecovery):
             if not left or {rival.name for rival in self._before(left)} - went_before:
                 break
             for rival in left:
-                if norm(rival.path[0] - places[rival.name]) > MOVED:
-                    places[rival.name], moved = rival.path[0], self.clock.now()
+                off = norm(np.array(been[rival.name]) - rival.path[0])
+                if off[-1] > MOVED:
+                    moved = self.clock.now()
+                    came_on = moved if off.min() > MOVED else came_on
+                    been[rival.name].append(rival.path[0])
         text = f"{why} {', '.join(sorted(names))}; waited {self.clock.now() - begun:.1f} s"
         return RecoveryResult(RecoveryOutcome.SUCCESS, text)
 

@@ -60,6 +60,13 @@ def test_the_robot_that_goes_first_waits_as_long_as_the_other_one_makes_room_and
     assert all(command.is_stopped() for command in motion.commands)
 
 
+def test_a_slow_one_is_waited_for_as_long_as_it_comes_on(give_way):
+    traffic = head_on(9.0, BackingUp(until=30.0))  # three times the wait are 18 s
+    result, motion = give_way(bay(2.4, 3.4, True), traffic=traffic, longest_wait=6.0)
+    assert "has the right of way over ben; waited 33." in result.message
+    assert all(command.is_stopped() for command in motion.commands)
+
+
 def test_the_robot_that_goes_first_pulls_out_itself_when_the_other_one_stands_and_stands(give_way):
     traffic = head_on(remaining=9.0)
     result, motion = give_way(bay(2.4, 3.4, True), traffic=traffic, longest_wait=4.0)
@@ -238,7 +245,7 @@ def test_it_does_not_wait_for_ever_for_one_that_moves_and_makes_no_room(give_way
     traffic = head_on(9.0, Swaying(until=300.0))
     result, motion = give_way(bay(2.4, 3.4, True), traffic=traffic, longest_wait=4.0)
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
-    assert "has pulled out" in result.message and "waited 12.0 s" in result.message
+    assert "has pulled out" in result.message and "waited 12.5 s" in result.message
     assert traffic.own.waits == 1
     assert 2.4 < motion.end.x < 3.4 and motion.end.y > 3.7
 
