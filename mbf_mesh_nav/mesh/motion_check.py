@@ -30,8 +30,8 @@ SURFACE_DISTANCE = 1.0
 """How far [m] a robot's frame may be off the surface it stands on."""
 UNKNOWN_RADIUS = 0.3
 """Radius [m] of a robot whose inscribed radius the map does not know."""
-STRIDE = 0.05
-"""Length [m] of the steps of a walk."""
+STRIDE, TURN = 0.05, 0.5
+"""Length [m] of the steps of a walk, and how far [rad] an arc turns over one of them at most."""
 
 
 def forbidden_ahead(
@@ -69,11 +69,14 @@ def forbidden_ahead(
     ahead = pose.rotation[:, 0] * command.vx + pose.rotation[:, 1] * command.vy
     direction = tangent(vector_of(ahead), vector_of(mesh.face_normals[face]))
     on_arc, total, walked = command.speed * duration, command.speed * duration + radius, 0.0
+    curvature = command.wz / command.speed
+    on_curve = min(STRIDE, TURN / abs(curvature)) if curvature != 0.0 else STRIDE
     centre = np.array(point)
     while walked < total:
-        stride = min(STRIDE, total - walked)
-        if walked < on_arc:
-            centre = np.array(point) + min(stride, on_arc - walked) * np.array(direction)
+        is_on_arc = walked < on_arc
+        stride = min(on_curve, on_arc - walked) if is_on_arc else min(STRIDE, total - walked)
+        half_turn = 0.5 * stride * curvature if is_on_arc else 0.0
+        direction = turned(direction, vector_of(mesh.face_normals[face]), half_turn)
         face, point, direction, done = walk(
             mesh.vertices, mesh.faces, mesh.face_neighbours, mesh.face_normals, face, point, direction, stride
         )
@@ -81,20 +84,20 @@ def forbidden_ahead(
         if ends and surface is None:
             return f"the surface ends at {position_text(point)}"
         comes_to = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
+        centre = np.array(point) if is_on_arc else centre
         if contact is None:
-            is_ahead = surface is not None and walked >= on_arc
+            is_ahead = surface is not None and not is_on_arc
             reaches_over = is_ahead and not _touches_lethal(mesh, ranks, face, point, centre, radius)
             may_come = may_enter(stands_on, comes_to) or reaches_over
         else:  # it knows what is touched on all sides
-            may_come = walked >= on_arc or (comes_to < LETHAL_RANK and contact.allows(face, point, comes_to))
+            may_come = not is_on_arc or (comes_to < LETHAL_RANK and contact.allows(face, point, comes_to))
         if not may_come:
             return obstacle_text(position_text(point))
         if ends and surface is not None:
             past = on_arc - walked - done
-            return _past_border(mesh, surface, face, point, direction, past, command.wz / command.speed)
+            return _past_border(mesh, surface, face, point, direction, past, curvature)
         stands_on, walked = comes_to, walked + stride
-        if command.wz != 0.0 and walked < on_arc:
-            direction = turned(direction, vector_of(mesh.face_normals[face]), command.wz * stride / command.speed)
+        direction = turned(direction, vector_of(mesh.face_normals[face]), half_turn)
     return ""
 
 

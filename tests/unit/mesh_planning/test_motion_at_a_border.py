@@ -71,3 +71,20 @@ def test_on_its_path_a_robot_fits_where_planners_let_its_centre(plain, paint):
     check = plain.path_check(AS_CONFIGURED)
     states = [check(Pose.planar(3.0, y)).state for y in (4.5, 4.83, 4.87, 5.2, 7.0)]
     assert states == [CellState.FREE, CellState.FREE, CellState.LETHAL, CellState.LETHAL, CellState.OUTSIDE]
+
+
+@pytest.mark.parametrize(
+    ("y", "yaw", "wz", "duration", "refused"),
+    [
+        (5.01, 0.5 * math.pi, -5.0, 0.1 * math.pi, False),  # straight on, its ground would begin 3 cm ahead
+        (5.01, 0.5 * math.pi, 5.0, 0.1 * math.pi, False),
+        (5.03, 0.0, 5.0, 0.2 * math.pi, True),  # straight on, it would never come there
+        (5.03, 0.0, -5.0, 0.2 * math.pi, False),
+        (5.01, 0.5 * math.pi, 0.0, 0.1, False),  # it drives 1 cm
+        (5.01, 0.5 * math.pi, 0.0, 0.5, True),
+    ],
+)
+def test_a_centre_is_looked_at_where_its_motion_leads(plain, paint, y, yaw, wz, duration, refused):
+    paint(plain, lambda v: np.where(v[:, 1] > 5.05, 1.0, 0.0))
+    there = Pose.planar(3.0, y, yaw)
+    assert bool(plain.obstacle_on_path(there, Twist.planar(0.1, wz=wz), duration)) == refused
