@@ -126,7 +126,7 @@ def drive(world: World, planner: Any, controller: Any, replan: float = 0.0) -> V
             continue
         why = f"{int(result.outcome)} {result.message}"
         pose, touched = world.stopped(pose)
-        if touched or not (world.robot.is_drawn or world.fits(pose)):
+        if touched:
             return ended("touched", why)
         if refused_at is not None and pose.distance_to(refused_at) < SAME_PLACE:
             return ended("refused", why)

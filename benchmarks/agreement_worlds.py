@@ -112,7 +112,7 @@ class World(ABC):
         self.delay.note(self.clock.time, command)
         poses = self.motion.drive(pose, command)
         self.clock.time += self.robot.period
-        return self.pose_on(*poses[-1].tolist()), self.robot.is_drawn and self.touches(poses)
+        return self.pose_on(*poses[-1].tolist()), self.touches(poses)
 
     def stopped(self, pose: Pose) -> tuple[Pose, bool]:
         """Where the robot stands after commands of zero, and whether it has touched something by then."""

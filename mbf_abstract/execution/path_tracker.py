@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
-from mbf_abstract.geometry.path_cusps import find_cusps, points_along
+from mbf_abstract.geometry.path_cusps import direction_past, find_cusps, points_along
 from mbf_abstract.geometry.polyline import polyline_lengths, reverse_segments
 from mbf_abstract.geometry.transform import Transform
 
@@ -154,10 +154,11 @@ class PathTracker:
         corner, following = self.points[segment : segment + 2].tolist()
         return [(f - c) / (end - begin) * (length - begin) + c for c, f in zip(corner, following, strict=True)]
 
-    def straight_on(self, distance: float) -> FloatArray:
-        """Point (dimensions,) ``distance`` [m] ahead on the path; past the next cusp, or the end, straight on.
+    def carried_on(self, distance: float) -> FloatArray:
+        """Point (dimensions,) ``distance`` [m] ahead on the path; past the next cusp, or the end, as it came there.
 
-        A robot that steers to a cusp itself turns ever more the nearer it comes, if it is a little beside the path.
+        A robot that steers to a cusp itself turns ever more the nearer it comes, if it is a little beside the path. One
+        that steers straight on past the end of a curved stroke turns less than planned, by half of ``SHORT_ARM`` of it.
         """
         cusp = self.next_cusp
         beyond = self.progress + distance - cusp
@@ -165,7 +166,17 @@ class PathTracker:
             return self.point_at(cusp + beyond)
         arm = max(min(SHORT_ARM, cusp - self.last_cusp), _POSITION_NOISE)
         end, before = self.point_at(cusp), self.point_at(cusp - arm)
-        return np.asarray(end + (end - before) * (beyond / arm))
+        straight = (end - before) / arm
+        heading = self._heading_at(cusp)
+        direction = straight if heading is None else direction_past(straight, heading, min(beyond / arm, 1.0))
+        return np.asarray(end + beyond * direction)
+
+    def _heading_at(self, cusp: float) -> FloatArray | None:
+        """Unit vector (dimensions,) of where the robot looks where it changes its gear; None at other cusps."""
+        k = int(self.lengths.searchsorted(cusp))
+        if not 0 < k < len(self.reverse) or self.reverse[k] == self.reverse[k - 1]:
+            return None
+        return np.asarray(self.path[k].rotation[: self.points.shape[1], 0])
 
     def points_at(self, lengths: FloatArray) -> FloatArray:
         """Points (m, dimensions) of the path at ``lengths`` (m,) [m] along it, clamped to its ends."""

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.geometry.arithmetic import norm, scalar_products
 
 FloatArray = NDArray[np.float64]
 
 ARM, GAINED = 0.2, 0.2
 """A path turns back on itself where two of its points, ``ARM`` [m] before and behind, are nearer than ``GAINED`` [m]:
 by 120 degrees, or on a smooth bend of a radius below 0.11 m."""
+BENT = 0.5
+"""The heading at a cusp is that of an arc that bends by at most so much [rad] from the middle of its last chord."""
 
 
 def find_cusps(points: FloatArray, lengths: FloatArray, reverse: NDArray[np.bool_]) -> FloatArray:
@@ -34,6 +38,28 @@ def find_cusps(points: FloatArray, lengths: FloatArray, reverse: NDArray[np.bool
 def points_along(points: FloatArray, lengths: FloatArray, at: FloatArray) -> FloatArray:
     """Points (m, dimensions) of a path at lengths (m,) [m] along it, clamped to its ends."""
     return np.stack([np.interp(at, lengths, column) for column in points.T], axis=-1)
+
+
+def direction_past(straight: FloatArray, heading: FloatArray, share: float) -> FloatArray:
+    """Unit vector (d,) from a cusp to a point that lies past it on the arc on which a path comes to it.
+
+    Parameters
+    ----------
+    straight : (d,) float64
+        Unit vector along the last chord before the cusp.
+    heading : (d,) float64
+        Where the robot looks at the cusp, along the arc or against it. One that is more than ``BENT`` off the chord
+        says nothing about the arc: then the path leads straight on.
+    share : float
+        How far the point lies past the cusp, in lengths of the chord; 0 to 1.
+    """
+    size, along = float(norm(heading)), float(scalar_products(heading, straight))
+    if abs(along) < math.cos(BENT) * size:
+        return straight
+    tangent = heading * math.copysign(1.0 / size, along)
+    next_chord = 2.0 * abs(along) / size * tangent - straight  # the last one, seen in a mirror across the tangent
+    direction = tangent + share * (next_chord - tangent)
+    return np.asarray(direction / float(norm(direction)))
 
 
 def _turns_back(points: FloatArray, lengths: FloatArray) -> FloatArray:

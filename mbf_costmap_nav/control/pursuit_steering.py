@@ -44,7 +44,7 @@ class PursuitSteering(RegulatedFollower):
         wanted = distance + tracker.deviation
         points = tracker.ahead(min(wanted, tracker.to_cusp))
         if wanted > tracker.to_cusp and not tracker.on_last_section:
-            points = np.vstack([points, tracker.straight_on(wanted)])
+            points = np.vstack([points, tracker.carried_on(wanted)])
         local = to_base_frame(points, cycle.request.pose)
         x, y = look_ahead_point(local, distance)
         return float(x), float(y)

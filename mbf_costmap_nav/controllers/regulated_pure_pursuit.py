@@ -22,7 +22,6 @@ from mbf_abstract.maps.controllers.end_of_path import at_exact_end, swept_poses,
 from mbf_abstract.maps.controllers.failures import blocked_path, missed_goal, obstacle_text
 from mbf_abstract.maps.controllers.room_to_turn import (
     CREEPING,
-    SMALL_TURN,
     RoomToTurn,
     along_path,
     angle_to_path,
@@ -34,13 +33,13 @@ from mbf_abstract.maps.controllers.room_to_turn import (
     wider_curves,
 )
 from mbf_abstract.maps.controllers.tight_places import (
-    AT_ONCE,
     CLOSE_FROM,
     CLOSELY,
     KEPT,
     REACH,
     SPACING,
     TightPlaces,
+    least_turn,
     speed_before,
 )
 from mbf_abstract.outcomes import ExePathOutcome
@@ -154,7 +153,7 @@ class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
         if curvature is None:
             return None
         assert self.tracker is not None
-        self.tracker.cusp_reached = AT_ONCE  # a curve that ends too early cannot be made up for
+        self.tracker.cusp_reached = CLOSELY
         self._known_free = Twist.planar(speed, wz=abs(speed) * curvature)
         return self._known_free
 
@@ -174,7 +173,7 @@ class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
         error = angle_to_path(cycle.tracker, pose, backward)
         if self._rolls(cycle, Twist()):
             return [*motions, Twist()] if self._can_turn_where_it_stops(cycle, backward) else motions
-        return [*motions, self._turn(cycle, error)] if abs(error) > SMALL_TURN else motions
+        return [*motions, self._turn(cycle, error)] if abs(error) > least_turn(cycle.tracker) else motions
 
     # ----------------------------------------------------------------------------------------------- collisions
     def _checked(self, cycle: ControlCycle, motions: list[Twist]) -> ControlResult:

@@ -6,7 +6,8 @@ round robots on paths away from obstacles, where the check finds nothing and cos
 Rule: where the outline does not fit, the path is left some lengths of the robot before and joined behind, and a search
 for a car that may reverse (``car_search``) goes from pose to pose; longer and longer pieces are tried, at last from
 start to goal. Each is tried with an outline half a cell larger first, as no controller keeps to a path exactly, and
-with tighter and tighter curves.
+with tighter and tighter curves. Where only the outline itself fits, one a fifth of a cell larger is tried after it: a
+search that finds nothing takes no longer so.
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ CURVES = (1.0, 0.3)
 """Radii of the curves of a robot that turns on the spot, in circumscribed radii."""
 FROM_START_TO_GOAL = 5
 """A search of the whole path may make so many times the states of a search of one piece."""
-MARGINS = (0.5, 0.0)
-"""How much larger the outline is taken, in cells."""
+ROOMY, SPARE = 0.5, 0.2
+"""How much larger the outline is taken [cells]: at first, and where nothing was found with that."""
 REVERSE_PENALTY, CHANGE_PENALTY, TURNING_PENALTY = 1.5, 0.5, 1.05
 
 
@@ -176,31 +177,38 @@ class Manoeuvres:
 
     def _drive(self, course: Course, first: int, last: int, *, everywhere: bool) -> FloatArray | None:
         """Poses (n, 3) between two poses of a course that the outline can drive; None if none were found."""
-        from mbf_costmap_nav.planning.car_search import search_drive  # with kernels that few paths need
-        from mbf_costmap_nav.planning.car_world import CarWorld
-
-        radius = self.footprint.circumscribed_radius
         ends = course.poses[[first, last]]
         if first == 0 and course.start_yaw is not None:
             ends[0, 2] = course.start_yaw
         if last == len(course.poses) - 1 and course.end_yaw is not None:
             ends[1, 2] = course.end_yaw
+        beside = BESIDE * self.footprint.circumscribed_radius
+        window = self.costmap if everywhere else self._around(course.poses[first : last + 1, :2], beside)
+        asked = window, ends, everywhere
+        roomy = self._search(*asked, ROOMY)
+        tight = self._search(*asked, 0.0) if roomy is None else None
+        spare = self._search(*asked, SPARE) if tight is not None else None
+        return next((drive for drive in (roomy, spare, tight) if drive is not None), None)
+
+    def _search(self, window: Costmap, ends: FloatArray, everywhere: bool, margin: float) -> FloatArray | None:
+        """Poses (n, 3) from one to the other of ``ends`` (2, 3) that an outline larger by ``margin`` [cells] drives."""
+        from mbf_costmap_nav.planning.car_search import search_drive  # with kernels that few paths need
+        from mbf_costmap_nav.planning.car_world import CarWorld
+
         start, goal = (Pose.planar(*end) for end in ends.tolist())
-        window = self.costmap if everywhere else self._around(course.poses[first : last + 1, :2], BESIDE * radius)
-        for margin in MARGINS:
-            outline = self.footprint.offset(margin * self.costmap.resolution)
-            world = CarWorld.build(
-                window, outline, self.token, cost_factor=self.cost_factor, allow_unknown=self.allow_unknown
-            )
-            if not (world.fits(start) and world.fits(goal)):
-                continue
-            ground = world.ground()
-            for curve in CURVES[:1] if everywhere or self.min_turning_radius > 0.0 else CURVES:
-                states = self.max_states * (FROM_START_TO_GOAL if everywhere else 1)
-                driving = self._driving(self.min_turning_radius or curve * radius, states)
-                leg = search_drive(world, driving, start, goal, ground=ground)
-                if len(leg.poses) and self._check.first_collision(self.costmap, dense(leg.poses)) < 0:
-                    return leg.poses
+        outline = self.footprint.offset(margin * self.costmap.resolution)
+        world = CarWorld.build(
+            window, outline, self.token, cost_factor=self.cost_factor, allow_unknown=self.allow_unknown
+        )
+        if not (world.fits(start) and world.fits(goal)):
+            return None
+        ground, radius = world.ground(), self.footprint.circumscribed_radius
+        for curve in CURVES[:1] if everywhere or self.min_turning_radius > 0.0 else CURVES:
+            states = self.max_states * (FROM_START_TO_GOAL if everywhere else 1)
+            driving = self._driving(self.min_turning_radius or curve * radius, states)
+            leg = search_drive(world, driving, start, goal, ground=ground)
+            if len(leg.poses) and self._check.first_collision(self.costmap, dense(leg.poses)) < 0:
+                return leg.poses
         return None
 
     def _driving(self, radius: float, max_states: int) -> Driving:

@@ -139,7 +139,7 @@ class PathFollower(LeavesContacts, SteeringFollower):
     def _target(self, share: float = 1.0) -> FloatArray:
         """The pursued point (3,) [m], or one at a share of its distance."""
         tracker, ahead = self._tracker, share * self.parameters.look_ahead_dist
-        return tracker.point_at(tracker.progress + ahead) if tracker.on_last_section else tracker.straight_on(ahead)
+        return tracker.point_at(tracker.progress + ahead) if tracker.on_last_section else tracker.carried_on(ahead)
 
     def _pursue(self, request: ControlRequest, fastest: float) -> ControlResult:
         """Drive the arc that is tangent to the robot's heading and passes through the point ahead, or turn to that.

@@ -38,6 +38,7 @@ REFUSED = (
     ("astar", "follow_path", 353), ("hybrid_astar", "follow_path", 387),
     ("hybrid_astar", "regulated_pure_pursuit", 387), ("theta_star", "regulated_pure_pursuit", 436),
     ("astar", "regulated_pure_pursuit", 448), ("dijkstra", "follow_path", 448), ("astar", "follow_path", 459),
+    ("dijkstra", "follow_path", 613), ("dijkstra", "regulated_pure_pursuit", 613),
 )  # fmt: skip
 """Drives on the costmap that were refused twice at one place."""
 REFUSED_ON_MESHES = (
@@ -57,6 +58,7 @@ STOOD = (
     ("costmap", "dijkstra", "dwa", 308), ("costmap", "dijkstra", "dwa", 325), ("costmap", "hybrid_astar", "mppi", 325),
     ("costmap", "theta_star", "rotation_shim", 325), ("costmap", "theta_star", "dwa", 344),
     ("costmap", "astar", "dwa", 353), ("costmap", "theta_star", "mppi", 353), ("costmap", "theta_star", "dwa", 415),
+    ("costmap", "astar", "dwa", 613), ("costmap", "dijkstra", "dwa", 613),
     ("mesh", "dijkstra", "mppi", 65), ("mesh", "dijkstra", "mppi", 67), ("mesh", "any_angle", "mppi", 323),
 )  # fmt: skip
 """Drives with sampled motions that stood before their goal until their time was over, crept, or touched something."""
@@ -67,7 +69,7 @@ OTHER_ROBOTS = (
     ("mesh", "cvp", "vector_field", 2007), ("mesh", "repairing", "path_follower", 2007),
     ("mesh", "heading_astar", "mppi", 2007), ("mesh", "cvp", "follow_path", 2018),
     ("mesh", "cvp", "path_follower", 2148), ("mesh", "dijkstra", "path_follower", 2167),
-    ("mesh", "cvp", "vector_field", 2157),
+    ("mesh", "cvp", "vector_field", 2157), ("mesh", "repairing", "follow_path", 2243),
     ("costmap", "straight_line", "dwa", 2183), ("costmap", "straight_line", "follow_path", 2183),
     ("costmap", "hybrid_astar", "follow_path", 2196), ("costmap", "hybrid_astar", "rotation_shim", 2183),
 )  # fmt: skip
@@ -214,6 +216,29 @@ def test_a_gap_hardly_wider_than_the_robot_is_driven_through_at_once(controller,
     world.ends = path[0], path[len(path) - 1]
     verdict = agreement.drive(world, OnePlan(path), world.plugin(PluginKind.CONTROLLER, controller))
     assert verdict.ending == "arrived", verdict
+
+
+@pytest.mark.parametrize("controller", ["follow_path", PURSUIT])
+def test_in_a_gap_a_stroke_is_driven_to_its_end(controller):
+    world, cusp = agreement.WORLDS["costmap"](0), (3.025, 2.2)
+    world.build([*rooms.WALLS, rooms.Box(0.0, 2.75, 1.0, 5.0), rooms.Box(3.3, rooms.SIDE, 1.0, 5.0)])
+    ys = [*np.arange(4.2, cusp[1], -0.05), *np.arange(cusp[1], 3.5, 0.05)]
+    path = RobotPath.from_poses([world.pose_on(cusp[0], float(y), -0.5 * np.pi) for y in ys])
+    driver, track = world.plugin(PluginKind.CONTROLLER, controller), [path[0]]
+    assert driver.set_plan(path)
+    while not driver.is_goal_reached(track[-1], 0.1, 0.2):
+        result = driver.compute_velocity_commands(ControlRequest(track[-1], world.motion.velocity))
+        assert result.success, result.message
+        track.append(world.moved(track[-1], result.command)[0])
+    assert min(pose.y for pose in track) == pytest.approx(cusp[1], abs=0.0051)
+
+
+def test_a_plan_through_a_gap_leaves_some_room_to_both_sides_where_there_is_any():
+    world = agreement.WORLDS["costmap"](613)  # a gap of 0.55 m for a padded width of 0.52 m
+    path = world.plugin(PluginKind.PLANNER, "dijkstra").make_plan(PlanRequest(*world.ends)).path
+    check = FootprintCheck(world.map.footprint.offset(0.2 * world.resolution), world.resolution)
+    poses = np.array([(pose.x, pose.y, pose.yaw) for pose in path])
+    assert check.first_collision(world.map.snapshot(), poses) == -1
 
 
 @pytest.mark.parametrize(("backend", "controller"), SAMPLING)

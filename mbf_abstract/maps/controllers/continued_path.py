@@ -45,5 +45,5 @@ def shift_between(old: PathTracker, new: PathTracker) -> float | None:
 
 def _direction(tracker: PathTracker) -> tuple[float, float]:
     """Where a path leads from the robot's place on, seen from above."""
-    x, y = (tracker.straight_on(ARM) - tracker.point_at(tracker.progress))[:2].tolist()
+    x, y = (tracker.carried_on(ARM) - tracker.point_at(tracker.progress))[:2].tolist()
     return x, y

@@ -27,7 +27,6 @@ from mbf_abstract.maps.controllers.inertia import (
     stopping_speed,
 )
 from mbf_abstract.maps.controllers.room_to_turn import (
-    SMALL_TURN,
     RoomToTurn,
     along_path,
     angle_to_path,
@@ -45,6 +44,7 @@ from mbf_abstract.maps.controllers.tight_places import (
     REACH,
     SPACING,
     TightPlaces,
+    least_turn,
     outline_fits,
     speed_before,
 )
@@ -217,7 +217,7 @@ class FollowPath(LeavesContacts, SteeringToPath, BrakesOnItsArc):
             return []
         error = angle_to_path(tracker, pose, backward)
         motions = along_path(tracker, pose, backward, rolls_on=self._rolls_on, turn_rate=self.parameters.turn_rate)
-        motions += [self._turn(error)] if abs(error) > SMALL_TURN else []
+        motions += [self._turn(error)] if abs(error) > least_turn(tracker) else []
         return [self._reachable(motion) for motion in motions]
 
     def _stays_on_map(self, pose: Pose, tracker: PathTracker) -> bool:

@@ -29,6 +29,8 @@ STILL = 0.02
 """Slower [m/s] it stands."""
 ROUNDING = 1e-9
 """With less than this share of its speed a robot stands."""
+NO_TURN = 1e-9
+"""A yaw rate [rad/s] of at most so much is rounding: that of a robot which is exactly on a straight path."""
 SINGLE = 1e-6
 """A change larger than allowed by less than this share of it is rounding, also of samples in single precision."""
 LOOKS = 4.0
@@ -129,7 +131,7 @@ class InertiaParameters(PluginParameters):
 
         A rate in proportion to the angle asks for up to twice as much braking as the rate at which this limit begins.
         """
-        if self.acc_lim_theta == math.inf:
+        if self.acc_lim_theta == math.inf or abs(rate) <= NO_TURN:
             return rate
         most = stopping_speed(abs(angle), 0.5 * self.acc_lim_theta, self.control_period)
         return max(-most, min(rate, most))

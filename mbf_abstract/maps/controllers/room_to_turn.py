@@ -8,7 +8,7 @@ stands on the path itself blocks all of it.
 Rule: where the wanted motion is blocked but the outline fits on the path ahead, the robot creeps close along the path,
 or turns on the spot to a point close ahead on it. Else wider and wider curves to the same side are tried, then going
 straight on; instead of a turn on the spot to what lies ahead or abeam, creeping along such curves. In all this the
-robot may drive ``distance`` [m] until it gets ahead on its path again.
+robot may drive ``distance`` [m], and turn once round, until it gets ahead on its path again.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from mbf_abstract.geometry import FloatArray, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.arithmetic import arctan2
 
-AHEAD = 0.05  # m of progress on the path that give back the whole distance
+AHEAD = 0.05  # m of progress on the path that give back the whole distance, and all turns
+ROUND = 2.0 * math.pi  # rad; who has turned so far has faced every direction
 CREEPING = 0.1  # m/s
 NEAR = (0.2, 0.1)
 """How far [m] ahead on the path the points lie that a robot creeps to where its usual look-ahead is blocked."""
@@ -57,10 +58,10 @@ def at_once(rate: float, angle: float) -> float:
 
 
 class RoomToTurn:
-    """The choice of a controller, and how far it has driven to make room."""
+    """The choice of a controller, and how far it has driven and turned to make room."""
 
     def __init__(self) -> None:
-        self._driven = 0.0
+        self._driven = self._turned = 0.0
         self._furthest = -math.inf
         self._made_room_at: Pose | None = None
 
@@ -106,6 +107,8 @@ class RoomToTurn:
         others = [*along(), *others]
         if others and self._driven >= distance:
             return None, f"{reason}; after {self._driven:.2f} m of driving on there is still no room to turn"
+        if others and self._turned >= ROUND:
+            return None, f"{reason}; after turning by {self._turned:.1f} rad in all nothing is free"
         motion = next((motion for motion in others if not blocked(motion)), None)
         if motion is None:
             return None, reason
@@ -115,9 +118,10 @@ class RoomToTurn:
     def _count_distance(self, pose: Pose, progress: float) -> None:
         if self._made_room_at is not None:
             self._driven += self._made_room_at.distance_to(pose)
+            self._turned += abs(normalize_angle(pose.yaw - self._made_room_at.yaw))
             self._made_room_at = None
         if progress > self._furthest + AHEAD:
-            self._furthest, self._driven = progress, 0.0
+            self._furthest, self._driven, self._turned = progress, 0.0, 0.0
 
 
 def wider_curves(wanted: Twist) -> list[Twist]:
@@ -159,7 +163,7 @@ def along_path(
     """
     motions = []
     for distance in distances:
-        x, y = tracker.straight_on(distance + rolls_on).tolist()
+        x, y = tracker.carried_on(distance + rolls_on).tolist()
         bearing, curvature = arc_to(pose, np.array([x, y, pose.z]))
         off = off_course(bearing, backward)
         if abs(off) <= LOOKS_ALONG:
@@ -171,7 +175,7 @@ def along_path(
 
 def angle_to_path(tracker: PathTracker, pose: Pose, backward: bool = False, rolls_on: float = 0.0) -> float:
     """Angle [rad] to the nearest of those points; one farther ahead may lie behind a corner."""
-    x, y = tracker.straight_on(NEAR[-1] + rolls_on).tolist()
+    x, y = tracker.carried_on(NEAR[-1] + rolls_on).tolist()
     return off_course(arc_to(pose, np.array([x, y, pose.z]))[0], backward)
 
 

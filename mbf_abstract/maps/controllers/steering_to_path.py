@@ -65,7 +65,7 @@ class SteeringToPath(MapPlugin):
     def _carrot(self, pose: Pose, tracker: PathTracker) -> tuple[float, float]:
         """Bearing [rad] of the point ahead on the path, and curvature [1/m] of the arc to it."""
         last, ahead = tracker.on_last_section, self.parameters.look_ahead_dist
-        x, y = (tracker.point_at(tracker.progress + ahead) if last else tracker.straight_on(ahead)).tolist()
+        x, y = (tracker.point_at(tracker.progress + ahead) if last else tracker.carried_on(ahead)).tolist()
         return arc_to(pose, np.array([x, y, pose.z]))
 
     def _backward(self, tracker: PathTracker) -> bool:

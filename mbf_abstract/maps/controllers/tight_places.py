@@ -21,7 +21,7 @@ import numpy as np
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Command, FloatArray, Pose, Twist
 from mbf_abstract.geometry.arithmetic import arctan2
-from mbf_abstract.maps.controllers.room_to_turn import CREEPING
+from mbf_abstract.maps.controllers.room_to_turn import CREEPING, SMALL_TURN
 from mbf_abstract.maps.map_plugin import MapPlugin
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 
@@ -35,10 +35,10 @@ SPACING, ARM = 0.1, 0.2
 """Distance [m] of the poses looked at; each looks along the line between the points ``ARM`` before and behind it."""
 HEADINGS = np.arange(16) * (math.pi / 8.0)
 """Where the outline fits with all of these [rad], the robot can turn."""
-CLOSELY = 0.02
-"""So near [m] a robot that is driven closely comes to a cusp."""
-AT_ONCE = 0.005
-"""So near [m] a car comes to it that keeps to its path by more than an arc to a point ahead."""
+CLOSELY = 0.005
+"""So near [m] a robot that is driven closely comes to a cusp: a curve that ends too early cannot be made up for."""
+SLIGHT_TURN = 0.005
+"""By less than this [rad] a robot that is driven closely does not turn on the spot."""
 KEPT = 0.05
 """An answer holds until the robot has come so far [m] on its path."""
 
@@ -114,7 +114,20 @@ class TightPlaces:
         A stroke that is driven closely may end a few millimetres before a wall, too near for a robot that is a little
         beside its path. The last centimetres of the stroke are not needed.
         """
-        return tracker.cusp_reached <= CLOSELY and tracker.begin_next_section()
+        return is_driven_closely(tracker) and tracker.begin_next_section()
+
+
+def is_driven_closely(tracker: PathTracker) -> bool:
+    """Whether the robot is driven closely along its path in this cycle."""
+    return tracker.cusp_reached <= CLOSELY
+
+
+def least_turn(tracker: PathTracker) -> float:
+    """Angle [rad] by which it has to be off a point ahead to turn to it on the spot, where that clears its path.
+
+    Between two walls a corner of a long outline touches one of them with a heading that is a hundredth off.
+    """
+    return SLIGHT_TURN if is_driven_closely(tracker) else SMALL_TURN
 
 
 def speed_before(distance: float, deceleration: float) -> float:

@@ -18,7 +18,7 @@ from mbf_abstract.maps.controllers.inertia import (
     speed_on_path,
     stopping_speed,
 )
-from mbf_abstract.maps.controllers.room_to_turn import CREEPING
+from mbf_abstract.maps.controllers.room_to_turn import CREEPING, along_path
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult
 
@@ -241,3 +241,12 @@ def test_after_braking_a_robot_goes_on_from_what_it_was_slowed_down_to():
     assert 0.0 < braked.vx < 0.3
     assert last_arc.begins_at(Twist.planar(0.5), Twist.planar(0.3), 0.05) == Twist.planar(0.3)
     assert last_arc.begins_at(Twist(), Twist.planar(0.3), 0.05) == braked
+
+
+@pytest.mark.parametrize("rate", [1e-9, -3e-17, 0.0])
+def test_a_robot_that_is_on_its_path_but_for_rounding_is_not_stopped_for_it(rate):
+    tracker = PathTracker(Path.from_points([(0.0, 0.0, 0.0), (2.0, 0.0, 0.0)]), dimensions=2)
+    assert SLOW.turn_rate(rate, 10.0 * rate) == rate
+    for y in (0.0, 1e-17, -1e-12):
+        near = along_path(tracker, Pose.planar(0.0, y), turn_rate=SLOW.turn_rate)[0]
+        assert near.vx == pytest.approx(CREEPING) and abs(near.wz) < 1e-9

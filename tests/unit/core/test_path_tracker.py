@@ -168,17 +168,34 @@ def test_a_cusp_that_is_near_may_be_taken_for_reached_and_the_end_may_not():
 def test_past_a_cusp_and_past_the_end_a_path_is_taken_to_lead_straight_on():
     tracker = PathTracker(path_through((0, 0), (2, 0), (0, 0.02), spacing=0.05))
     tracker.update((1.7, 0.0, 0.0))
-    assert tracker.straight_on(0.2) == pytest.approx((1.9, 0.0, 0.0))
-    assert tracker.straight_on(0.7) == pytest.approx((2.4, 0.0, 0.0))
+    assert tracker.carried_on(0.2) == pytest.approx((1.9, 0.0, 0.0))
+    assert tracker.carried_on(0.7) == pytest.approx((2.4, 0.0, 0.0))
 
 
 def test_past_the_cusp_of_a_stroke_of_few_centimetres_a_path_leads_on_as_the_stroke_does():
-    poses = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.97, 0.01, -0.3), (1.5, -0.15, -0.3)]
+    poses = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.97, 0.01, -math.atan2(1, 3)), (1.5, -0.15, -0.3)]
     tracker = PathTracker(Path.from_poses([Pose.planar(*pose) for pose in poses]), dimensions=2)
     tracker.update((1.0, 0.0))
     assert tracker.driving_backward and tracker.to_cusp == pytest.approx(math.hypot(0.03, 0.01))
-    ahead = tracker.straight_on(0.5)
+    ahead = tracker.carried_on(0.5)
     assert ahead == pytest.approx(np.array([1.0, 0.0]) + 0.5 / math.hypot(0.03, 0.01) * np.array([-0.03, 0.01]))
+
+
+@pytest.mark.parametrize("backward", [False, True])
+def test_past_the_cusp_of_a_curved_stroke_a_path_leads_on_along_the_curve(backward):
+    """So a robot that steers to a point ahead comes to the cusp with the heading that is planned there."""
+    radius, gear = 0.5, -1.0 if backward else 1.0
+    angles = np.append(np.arange(0.0, 1.01, 0.05), [0.95, 0.9])  # there, and a little back in the other gear
+    poses = [Pose.planar(radius * gear * math.sin(a), radius * (1.0 - math.cos(a)), gear * a) for a in angles]
+    tracker = PathTracker(Path.from_poses(poses), dimensions=2)
+    tracker.cusp_reached = 0.005
+    tracker.update((poses[19].x, poses[19].y))
+    assert tracker.driving_backward == backward and tracker.to_cusp == pytest.approx(0.025, abs=1e-3)
+    for beyond in (0.03, 0.075, 0.1):
+        x, y = tracker.carried_on(tracker.to_cusp + beyond)
+        assert math.hypot(x, y - radius) == pytest.approx(radius, abs=5e-4)
+        past = 1.0 + beyond / radius
+        assert (x, y) == pytest.approx((radius * gear * math.sin(past), radius * (1.0 - math.cos(past))), abs=2e-3)
 
 
 def test_a_cusp_where_the_robot_reverses_is_not_found_a_second_time_because_the_path_turns_back_there():

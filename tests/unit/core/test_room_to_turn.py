@@ -157,3 +157,14 @@ def test_the_angle_to_the_path_is_that_to_a_point_close_ahead_not_round_the_corn
     tracker.update((0.0, 0.0))
     here = Pose.planar(0.0, 0.0, 0.4 + math.pi * backward)
     assert angle_to_path(tracker, here, backward) == pytest.approx(-0.4)
+
+
+def test_who_has_turned_once_round_without_getting_ahead_finds_no_room():
+    room = RoomToTurn()
+    for turn in range(12):
+        motion, reason = room.choose(
+            Pose.planar(0.0, 0.0, 0.6 * turn), 0.0, [LEFT, Twist.planar(wz=0.6)], 0.5, blocks(lambda one: one.vx != 0.0)
+        )
+        assert (motion is None) == (turn == 11), reason
+    assert reason == "a wall; after turning by 6.6 rad in all nothing is free"
+    assert room.choose(HERE, 2.0 * AHEAD, [LEFT, Twist.planar(wz=0.6)], 0.5, blocks(lambda one: one.vx != 0.0))[0]

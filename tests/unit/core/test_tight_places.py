@@ -7,7 +7,17 @@ import pytest
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.maps.controllers.tight_places import KEPT, REACH, ROOM, TightPlaces
+from mbf_abstract.maps.controllers.room_to_turn import SMALL_TURN
+from mbf_abstract.maps.controllers.tight_places import (
+    CLOSELY,
+    KEPT,
+    REACH,
+    ROOM,
+    SLIGHT_TURN,
+    TightPlaces,
+    is_driven_closely,
+    least_turn,
+)
 
 LINE = [(0.1 * k, 0.0, 0.0) for k in range(41)]
 
@@ -148,3 +158,10 @@ def test_a_robot_that_turns_to_its_path_keeps_to_it_closely_until_it_has_come_on
     assert places.is_close(tracker) and places.distance(tracker, True, lambda x, y, yaw: True) == 0.0
     tracker.update((1.01 + KEPT, 0.0))
     assert not places.is_close(tracker) and places.distance(tracker, True, lambda x, y, yaw: True) == math.inf
+
+
+def test_who_is_driven_closely_turns_to_the_path_by_less_than_others():
+    tracker = tracker_at(0.5)
+    assert not is_driven_closely(tracker) and least_turn(tracker) == SMALL_TURN
+    tracker.cusp_reached = CLOSELY
+    assert is_driven_closely(tracker) and least_turn(tracker) == SLIGHT_TURN < SMALL_TURN
