@@ -2,9 +2,10 @@
 
 A path that a planner returns is driven without inertia on a map that does not change. A pair agrees if the outline fits
 at every pose of the path, if the controller does not refuse the plans of one place twice, and if the robot arrives. So
-a robot does not agree that stands, goes about until its time is over, or is led to where the planner knows no path
-any more. Rooms of 6 m x 6 m with boxes and walls with gaps; on the costmap a robot of 1.0 m x 0.5 m, on the mesh a disc
-of 0.25 m. With ``--open`` no walls stand around: the map ends in free ground; that of a mesh always does, on two sides.
+a robot does not agree that stands, goes about until its time is over, or is led to where the planner knows no path any
+more. A contact of the outline without padding ends a drive. Rooms of 6 m x 6 m with boxes and walls with gaps; on the
+costmap a robot of 1.0 m x 0.5 m, on the mesh a disc of 0.25 m. With ``--open`` no walls stand around: the map ends in
+free ground; that of a mesh always does, on two sides.
 ``--map car``: a car of 1.0 m x 0.5 m with a turning circle of 0.7 m in rooms of 9 m x 9 m, and what can drive it.
 
     python benchmarks/agreement.py [--quick] [--json] [--seeds 0:40] [--map costmap] [--planners a,b] [--controllers c]
@@ -15,7 +16,7 @@ of 0.25 m. With ``--open`` no walls stand around: the map ends in free ground; t
 ``--robots drawn`` draws another robot for each seed, see ``agreement_robots``: discs, rectangles, L-shapes, trapezoids
 about any centre, with inertia, a rate of control and a delay of their own, in rooms as much wider as they are. Plugins
 are given the robot's limits, and keep all other defaults. Each controller drives with one planner a seed, in turn, if
-none is named. Contacts of the outline without padding end a drive; commands beyond a limit are counted.
+none is named. Commands beyond a limit are counted.
 
 ``--results`` keeps every finished drive as a JSON line; a drive that is in the file is not repeated.
 """
