@@ -54,7 +54,7 @@ def direction_past(straight: FloatArray, heading: FloatArray, share: float) -> F
         How far the point lies past the cusp, in lengths of the chord; 0 to 1.
     """
     size, along = float(norm(heading)), float(scalar_products(heading, straight))
-    if abs(along) < math.cos(BENT) * size:
+    if abs(along) <= math.cos(BENT) * size:
         return straight
     tangent = heading * math.copysign(1.0 / size, along)
     next_chord = 2.0 * abs(along) / size * tangent - straight  # the last one, seen in a mirror across the tangent
