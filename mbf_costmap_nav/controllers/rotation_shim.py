@@ -107,7 +107,9 @@ class RotationShimController(PathFollower):
         )
         self._aligning = self._aligning and abs(angle) > limit and not cycle.touches  # the inner one gets it out
         command = self._rotation(angle, request.velocity)
-        if not self._aligning or self._sweeps_obstacle(cycle, angle, command):
+        # One of them for good: if the inner one turns back, the shim would turn again, and so on.
+        self._aligning = self._aligning and not self._sweeps_obstacle(cycle, angle, command)
+        if not self._aligning:
             result = self._inner.compute_velocity_commands(request)
         else:
             result = ControlResult(ExePathOutcome.SUCCESS, "turning to the path", command)
@@ -118,9 +120,10 @@ class RotationShimController(PathFollower):
         return abs(cycle.request.velocity.wz) > 1e-2 and abs(cycle.request.velocity.vx) < 1e-2
 
     def _angle_to_path(self, cycle: ControlCycle) -> float:
-        """Bearing [rad] of the path point ahead in the base frame."""
-        ahead = cycle.tracker.ahead(self.parameters.forward_sampling_distance)[-1:]
-        x, y = to_base_frame(ahead, cycle.request.pose)[0].tolist()
+        """Bearing [rad] of the path point ahead in the base frame; not of one behind a change of gears."""
+        tracker, distance = cycle.tracker, self.parameters.forward_sampling_distance
+        ahead = tracker.ahead(distance)[-1] if tracker.on_last_section else tracker.carried_on(distance)
+        x, y = to_base_frame(ahead[None], cycle.request.pose)[0].tolist()
         if cycle.tracker.driving_backward:
             x, y = -x, -y
         return math.atan2(y, x) if math.hypot(x, y) > 1e-3 else 0.0
