@@ -50,7 +50,7 @@ from terrain.sweeps.log import SweepLog
 
 DIST_TOLERANCE, ANGLE_TOLERANCE = 0.1, 0.25
 LONGEST, STANDING = 90.0, 20.0  # s, of a robot of 0.5 m/s in a room that is not scaled
-USUAL_SPEED = 0.5  # m/s
+USUAL_SPEED, USUAL_YAW_RATE = 0.5, 1.0  # m/s, rad/s
 SAME_PLACE = 0.1  # m
 NEEDS_PLANNER = {"mesh.vector_field": "cvp"}  # a controller that follows what only this planner adds to its path
 
@@ -140,7 +140,8 @@ def drive(world: World, planner: Any, controller: Any, replan: float = 0.0) -> V
 def longest_drive(world: World) -> float:
     """Time [s] after which a drive is late."""
     robot = world.robot
-    return round(LONGEST * robot.scale * max(1.0, USUAL_SPEED / robot.max_vel_x)) if robot.is_drawn else LONGEST
+    slowness = max(1.0, USUAL_SPEED / robot.max_vel_x, USUAL_YAW_RATE / robot.max_vel_theta)
+    return round(LONGEST * robot.scale * slowness) if robot.is_drawn else LONGEST
 
 
 def text_of(command: Twist) -> str:

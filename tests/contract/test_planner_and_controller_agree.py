@@ -71,8 +71,7 @@ OTHER_ROBOTS = (
     ("mesh", "cvp", "path_follower", 2148), ("mesh", "dijkstra", "path_follower", 2167),
     ("mesh", "cvp", "vector_field", 2157), ("mesh", "repairing", "follow_path", 2243),
     ("costmap", "straight_line", "dwa", 2183), ("costmap", "straight_line", "follow_path", 2183),
-    ("costmap", "hybrid_astar", "follow_path", 2196), ("costmap", "hybrid_astar", "rotation_shim", 2183),
-    ("costmap", "dijkstra", "rotation_shim", 2257),
+    ("costmap", "hybrid_astar", "rotation_shim", 2183), ("costmap", "dijkstra", "rotation_shim", 2257),
 )  # fmt: skip
 """Robots with other outlines, inertia, rates of control and delays that touched something, or were refused."""
 THROUGH_GAPS = [
