@@ -241,7 +241,6 @@ def test_the_shim_aligns_again_for_a_new_path(shim):
     assert command_at(shim, math.pi / 2).vx == 0.0
 
 
-<<<<<<< HEAD
 ALONG_Y = Path.from_points([(1.0, y, 0.0) for y in np.linspace(1.0, 4.0, 61)])
 
 
@@ -274,7 +273,8 @@ def test_the_shim_leaves_a_robot_that_rolls_to_the_inner_controller_where_it_wou
     rolling = ControlRequest(Pose.planar(1.0, 1.0), Twist.planar(0.8))
     assert beside_wall.compute_velocity_commands(rolling).message != "turning to the path"
     assert braking_shim(make_plugin, FREE).compute_velocity_commands(rolling).message == "turning to the path"
-=======
+
+
 def test_the_shim_does_not_turn_to_what_lies_behind_a_change_of_gears(shim):
     xs = [3.0, 3.1, *np.arange(3.05, 2.0, -0.05)]  # forward 0.1 m, then back
     shim.set_plan(Path.from_poses([Pose.planar(float(x), 1.0, 0.0) for x in xs]))
@@ -293,7 +293,6 @@ def test_where_its_turn_is_blocked_the_shim_leaves_the_path_to_the_inner_control
         assert shim.compute_velocity_commands(request).message != "turning to the path"
     shim.set_plan(Path.from_points([(3, 3, 0), (3, 1, 0)]))
     assert shim.compute_velocity_commands(request).message == "turning to the path"
->>>>>>> 3864b8f2 (rotation_shim turns to no point behind a change of gears, and leaves a path on which its turn is blocked to the inner controller)
 
 
 def test_the_shim_refuses_unknown_parameters_of_the_inner_controller(make_plugin):
