@@ -130,7 +130,6 @@ FAULTS = {
     },
     refines_by_cutting_the_end: {
         "a_refined_path_keeps_its_ends_and_is_no_longer",
-        "a_refined_path_costs_no_more",
         "a_refined_path_stays_in_its_frame",
     },
     refines_by_straight_lines: {"a_refined_path_costs_no_more"},
