@@ -112,7 +112,7 @@ class TightPlaces:
         """Where the way is blocked, go on to the next stroke of a manoeuvre; whether the robot is near enough to it.
 
         A stroke that is driven closely may end a few millimetres before a wall, too near for a robot that is a little
-        beside its path. The last centimetres of the stroke are not needed.
+        beside its path. The last millimetres of the stroke are not needed.
         """
         return is_driven_closely(tracker) and tracker.begin_next_section()
 
