@@ -204,8 +204,9 @@ class KeepingToPath:
         return result
 
     def _held(self, command: Twist, measured: Twist, limits: MotionLimits) -> Twist:
-        """The same arc within the limits."""
-        return limits.hold(command, self._goes_on_from(command, measured, limits))
+        """The same arc within the limits; its turn counts from what is measured, not to turn past the path."""
+        begin = self._goes_on_from(command, measured, limits)
+        return limits.hold(command, Twist.planar(begin.vx, begin.vy, measured.wz))
 
     def _goes_on_from(self, command: Twist, measured: Twist, limits: MotionLimits) -> Twist:
         """What a command is counted from; of a car where its samples begin, whose curve is as tight as can be."""

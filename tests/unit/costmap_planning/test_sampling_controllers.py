@@ -170,6 +170,22 @@ def test_both_directions_of_an_omnidirectional_robot_change_together(make_plugin
         assert controller._keeping.is_keeping == (gap == 9)
 
 
+def test_a_robot_that_keeps_to_its_path_is_not_asked_for_ever_faster_turns_that_it_does_not_follow(make_plugin):
+    """A truck of 3 m turns half as fast as commanded; asked for more and more it turned past its goal's heading."""
+    cells = np.zeros((200, 200), dtype=np.uint8)
+    cells[:, 112:114] = 254
+    cells[96:105, 112:114] = 0
+    controller = make_plugin(MPPIController, Costmap(cells, 0.05, -5.0, -5.0), batch_size=500, acc_lim_theta=1.0)
+    controller.set_plan(Path.from_points([(x, 0.02, 0.0) for x in np.linspace(0.0, 2.0, 21)]))
+    measured, commanded = Twist(), []
+    for _ in range(20):
+        command = controller.compute_velocity_commands(ControlRequest(Pose.planar(0.0, 0.02, 0.6), measured)).command
+        assert controller._keeping.is_keeping and abs(command.wz) <= abs(measured.wz) + 1.0 * 0.05 + 1e-5
+        measured = Twist.planar(command.vx, wz=0.5 * command.wz)
+        commanded.append(command.wz)
+    assert min(commanded) < -0.05
+
+
 def test_a_differential_robot_never_moves_sideways(make_plugin):
     controller = make_plugin(MPPIController, FREE_MAP, batch_size=500)
     controller.set_plan(Path.from_points([(0, y, 0.0) for y in np.linspace(0, 3, 31)]))
