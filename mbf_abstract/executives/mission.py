@@ -44,6 +44,8 @@ class MissionContext:
         Newest feedback of driving along ``path``.
     failure : ActionResult, optional
         The last failure of planning, driving, a check or a watchdog; recoveries are picked by its code.
+    refused : float, optional
+        When [s] a cycle of driving failed last, also one that was tried again.
     detour_asked : tuple of Pose, float and bool, optional
         Where and when [s] a detour was asked for last, and whether it was taken.
     stuck : StuckMonitor

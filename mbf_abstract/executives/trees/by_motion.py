@@ -13,7 +13,7 @@ from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.executives.nodes import Leaf, PickedChild
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.result_types import ActionResult
-from mbf_abstract.maps.tracking.blocking import Blockage
+from mbf_abstract.maps.tracking.blocking import ALONG, Blockage
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome
 
@@ -29,8 +29,6 @@ TOGETHER, FACING = 2.5, 3.0
 the robot; after the second [s] it does not go on before the robot."""
 SAME_STOP = 0.5
 """Two estimates [s] of when somebody stopped that are this near are of one stop."""
-ALONG = 0.7
-"""From this cosine on between the path and its way somebody goes along the path."""
 
 
 class PickByMotion(PickedChild):

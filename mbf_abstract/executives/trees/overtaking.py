@@ -18,13 +18,13 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.detours import SHORT_DETOUR, UpdatePath
 from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.executives.nodes import Leaf
-from mbf_abstract.executives.trees.by_motion import ALONG, MARGIN, first_in_the_way
+from mbf_abstract.executives.trees.by_motion import MARGIN, first_in_the_way
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.goals.result_types import ActionResult, GetPathResult
 from mbf_abstract.maps.queries import CellState
-from mbf_abstract.maps.tracking.blocking import Blockage
+from mbf_abstract.maps.tracking.blocking import ALONG, Blockage
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.maps.tracking.prediction import SLOW
 

@@ -16,8 +16,8 @@ STEP = 0.2
 """Time [s] between two looks at where a moving object will be."""
 CHORD = 0.3
 """Over so much of a path [m] the way that it leads is looked at."""
-SAME_WAY = 0.7
-"""From this cosine on between the path and its way somebody goes where the path goes."""
+ALONG = 0.7
+"""From this cosine on between the path and its way somebody goes along the path."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def _ahead(known: TrackedObject, poses: FloatArray) -> float:
 def _follows(known: TrackedObject, poses: FloatArray) -> bool:
     """Whether an object moves, is behind the first of the poses (n, 3), and goes where the path goes there."""
     moves = known.motion is Motion.MOVING and len(poses) > 0
-    return moves and _ahead(known, poses) < 0.0 and _along(known, poses, 0) >= SAME_WAY
+    return moves and _ahead(known, poses) < 0.0 and _along(known, poses, 0) >= ALONG
 
 
 def _along(known: TrackedObject, poses: FloatArray, pose: int) -> float:
