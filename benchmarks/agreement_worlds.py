@@ -180,7 +180,7 @@ class CostmapWorld(World):
     def first_misfit(self, path: Any) -> int:
         """As for all; here with the samples of the controllers."""
         check, costmap = FootprintCheck(self.map.footprint, self.resolution), self.map.snapshot()
-        return check.first_collision(costmap, np.array([(pose.x, pose.y, pose.yaw) for pose in path]))
+        return check.first_collision(costmap, path.planar_poses)
 
     def touches(self, poses: FloatArray) -> bool:
         """As for all."""

@@ -17,7 +17,7 @@ from mbf_abstract.goals.feedback_types import NoFeedback
 from mbf_abstract.goals.goal_types import RecoveryGoal
 from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.goals.result_types import RecoveryResultMessage
-from mbf_abstract.outcomes import RecoveryOutcome, is_success
+from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import with_changes
 from mbf_abstract.plugins import AbstractRecovery, PluginKind
 
@@ -64,8 +64,7 @@ class RecoveryAction(PluginAction[RecoveryGoal, RecoveryResultMessage, NoFeedbac
         with run, run.map_in_use():
             result = execution.execute()
         # 3. Its outcome is the goal's; a text is never missing.
-        verdict = "done" if is_success(result.outcome) else "failed"
-        message = result.message or f"recovery {plugin.name!r} {verdict}"
+        message = result.message or f"recovery {plugin.name!r} done"
         return RecoveryResultMessage(int(result.outcome), message, used_plugin=plugin.name)
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> RecoveryResultMessage:

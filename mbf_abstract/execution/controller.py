@@ -305,8 +305,7 @@ class ControllerExecution:
         if result.outcome == ExePathOutcome.MISSED_GOAL:  # a robot that stands does not get back before its goal
             return self._end(ControllerState.MISSED_GOAL, result.outcome, result.message)
         if self._failures > parameters.controller_max_retries >= 0:
-            text = result.message or f"{self._failures} failed cycle(s) in a row"
-            return self._end(ControllerState.MAX_RETRIES, result.outcome, text)
+            return self._end(ControllerState.MAX_RETRIES, result.outcome, result.message)
         if self._run.is_patience_over():
             return self._patience_end()
         self._enter(ControllerState.NO_LOCAL_CMD)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import numbers
 from typing import TypeVar
@@ -10,6 +11,7 @@ import numpy as np
 
 from mbf_abstract.drive.commands import command_problem
 from mbf_abstract.geometry import AckermannCommand, Path, Twist
+from mbf_abstract.outcomes import outcome_name
 from mbf_abstract.plugins import PluginResult
 
 MAX_OUTCOME = 2**32 - 1  # outcomes are unsigned integers of 32 bits in ``mbf_msgs``
@@ -29,7 +31,7 @@ def checked_answer(answer: object, expected: type[A], plugin: str, method: str) 
     """Return a plugin's answer if it is a result that can be passed on; raises PluginFault if it is not.
 
     A wrong type is a fault of the plugin that calling it again cannot change. A command of the right type that is not
-    finite raises PluginNonFinite: the next one may be finite.
+    finite raises PluginNonFinite: the next one may be finite. A failure without a text gets one that names the plugin.
     """
     if not isinstance(answer, expected):
         raise PluginFault(f"plugin {plugin!r} returned {type(answer).__name__} from {method}, not {expected.__name__}")
@@ -48,6 +50,10 @@ def checked_answer(answer: object, expected: type[A], plugin: str, method: str) 
         raise PluginFault(f"plugin {plugin!r} returned {problem}, from {method}")
     if (command := getattr(answer, "command", None)) is not None and (not_finite := command_problem(command)):
         raise PluginNonFinite(f"plugin {plugin!r}: {not_finite}, from {method}")
+    if not (answer.message or answer.success):
+        name = outcome_name(answer.outcome)
+        answer = copy.copy(answer)  # the plugin may keep its own, which is frozen
+        object.__setattr__(answer, "message", f"plugin {plugin!r} failed with {name} and gave no reason")
     return answer
 
 

@@ -12,9 +12,6 @@ from mbf_abstract.geometry.pose import Pose
 
 FloatArray = NDArray[np.float64]
 
-STRAIGHT = 1e-9
-"""A slower turn [rad/s] bends no arc that anybody drives."""
-
 
 def in_robot_frame(pose: Pose, point: NDArray[np.float64]) -> NDArray[np.float64]:
     """Coordinates (3,) of a global point in the robot's frame: x ahead, y left, both in its tangent plane."""
@@ -38,10 +35,11 @@ def arc_poses(
 
 
 def poses_on_arc(pose: tuple[float, float, float], vx: float, vy: float, wz: float, times: FloatArray) -> FloatArray:
-    """Poses (n, 3) of a body that keeps a velocity, after some ``times`` (n,) [s] above 0; see ``arc_poses``."""
+    """Poses (n, 3) of a body that keeps a velocity, after some ``times`` (n,) [s], 0 or more; see ``arc_poses``."""
     x, y, yaw = pose
     # Driven is an arc; its chord points half the turn away from the heading and is sin(half) / half times as long.
     half_turns = (0.5 * wz) * times
-    chords = times * (np.sin(half_turns) / half_turns) if abs(wz) > STRAIGHT else times
+    turned = half_turns != 0.0
+    chords = times * np.divide(np.sin(half_turns), half_turns, out=np.ones_like(half_turns), where=turned)
     c, s = np.cos(yaw + half_turns), np.sin(yaw + half_turns)
     return np.column_stack([x + chords * (vx * c - vy * s), y + chords * (vx * s + vy * c), yaw + wz * times])

@@ -9,7 +9,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbf_abstract.geometry.arithmetic import norm, scalar_products
+from mbf_abstract.geometry.arithmetic import arctan2, norm, scalar_products
 from mbf_abstract.geometry.pose import Pose
 from mbf_abstract.geometry.rotations import (
     QUATERNION_NORM_TOLERANCE,
@@ -31,6 +31,13 @@ def _refuse_wrong_pose(positions: FloatArray, orientations: FloatArray, squared_
         raise NonFiniteError(f"pose {i} of the path is not finite: {positions[i].tolist()} {orientations[i].tolist()}")
     i = int(np.argmax(np.abs(squared_norms - 1.0) > QUATERNION_NORM_TOLERANCE))
     raise ValueError(f"orientation of pose {i} has squared norm {squared_norms[i]:.6g}, expected 1")
+
+
+def _refuse_infinite(points: FloatArray, what: str) -> None:
+    """Name the first of the points or normals (n, 3) of a path that is not finite, before anything is computed."""
+    if not np.isfinite(points).all():
+        i = int(np.argmax(~np.isfinite(points).all(axis=1)))
+        raise NonFiniteError(f"{what} {i} of the path is not finite: {points[i].tolist()}")
 
 
 def _rows(values: ArrayLike, columns: int, what: str) -> FloatArray:
@@ -141,8 +148,11 @@ class Path:
         Raises ValueError as the class does.
         """
         points = _rows(positions, 3, "positions")
-        if normals is not None and np.shape(normals) != points.shape:
-            raise ValueError(f"the normals of a path have the shape {np.shape(normals)}, expected {points.shape}")
+        _refuse_infinite(points, "pose")
+        if normals is not None:
+            if np.shape(normals) != points.shape:
+                raise ValueError(f"the normals of a path have the shape {np.shape(normals)}, expected {points.shape}")
+            _refuse_infinite(np.asarray(normals, dtype=np.float64), "normal")
         ahead = np.tile([1.0, 0.0, 0.0], (len(points), 1))
         steps = np.diff(points, axis=0)
         moving = np.flatnonzero(steps.any(axis=1))
@@ -174,6 +184,14 @@ class Path:
 
     def __iter__(self) -> Iterator[Pose]:
         return (self[i] for i in range(len(self)))
+
+    @property
+    def planar_poses(self) -> FloatArray:
+        """(n, 3) float64, x, y [m] and yaw [rad] of each pose."""
+        assert self.orientations is not None
+        x, y, z, w = self.orientations.T
+        yaws = arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return np.column_stack([self.positions[:, :2], yaws])
 
     @property
     def length(self) -> float:

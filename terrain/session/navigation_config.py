@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import yaml
 
-from mbf_abstract.config.yaml_source import read_yaml
+from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.yaml_source import YamlDocument, read_yaml
 from terrain.description.placeholders import fill_in
 from terrain.provenance.named_files import InputCopies, with_whole_folders
 from terrain.scenarios.settings import apply_settings
 from terrain.urdf_robots.robot_choice import RobotChoice, description_of
+
+WRITTEN = "navigation.yaml"
 
 
 def write_navigation_config(
@@ -40,7 +45,7 @@ def write_navigation_config(
     for placeholder, file in maps.items():
         text = text.replace(placeholder, names[file])
     text = fill_in(text, str(source), partial(description_of, robot))
-    target = folder / "navigation.yaml"
+    target = folder / WRITTEN
     target.write_text(apply_settings(text, settings))
     document = read_yaml(target, [])  # what is wrong with it is reported when the server reads it
     if document is not None:
@@ -49,3 +54,19 @@ def write_navigation_config(
         if renamed != document.data:
             target.write_text(yaml.safe_dump(renamed, sort_keys=False))
     return target
+
+
+@contextmanager
+def errors_in_source(source: Path, folder: Path, settings: Mapping[str, str]) -> Iterator[None]:
+    """Let a ConfigError of the configuration written to ``folder`` name its source, and the lines of its keys there."""
+    try:
+        yield
+    except ConfigError as error:
+        document = read_yaml(source, []) or YamlDocument(source, {})
+        raise ConfigError([_in_source(one, document, folder, settings) for one in error.findings]) from error
+
+
+def _in_source(finding: Finding, source: YamlDocument, folder: Path, settings: Mapping[str, str]) -> Finding:
+    if finding.file != str(folder / WRITTEN):
+        return finding
+    return replace(source.located(finding), file=f"{source.path}{' (with settings)' if settings else ''}")

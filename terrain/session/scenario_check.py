@@ -28,7 +28,7 @@ from terrain.scenarios.places import Place
 from terrain.scenarios.scenario import Scenario, read_scenario, robot_scenarios
 from terrain.scenarios.settings import apply_world_settings
 from terrain.scenarios.world import ScenarioWorld
-from terrain.session.navigation_config import write_navigation_config
+from terrain.session.navigation_config import errors_in_source, write_navigation_config
 from terrain.session.robot_fit import notes_on_fit
 from terrain.session.site import StartingRobot, overlapping_starts
 from terrain.urdf_robots.robot_choice import RobotChoice, description_of, notes_on, spec_of
@@ -185,12 +185,9 @@ def _check_server(
     source: Path, robot: RobotChoice, maps: Maps, settings: Mapping[str, str], folder: Path, findings: list[Finding]
 ) -> list[str]:
     """Read the maps and construct the plugins of a configuration; returns the notes of its server."""
-    with _Collecting(findings, source) as collecting:
+    with _Collecting(findings, source) as collecting, errors_in_source(source, folder, settings):
         file = write_navigation_config(source, robot, maps, folder, settings, InputCopies(folder))
-        collecting.renamed = {
-            str(file): f"{source} (with settings)" if settings else str(source),
-            str(folder): str(source.parent),
-        }
+        collecting.renamed = {str(file): str(source), str(folder): str(source.parent)}
         with standing_server(*read_config(file), spec_of(robot).min_turning_radius) as server:
             return [*server.notes, *notes_on_fit(server, robot)]
     return []

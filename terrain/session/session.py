@@ -39,7 +39,7 @@ from terrain.scenarios.settings import apply_world_settings
 from terrain.sensors.proprioception import WheelOdometryReading
 from terrain.sensors.rays import FellowRays
 from terrain.sensors.sensor import Sensor
-from terrain.session.navigation_config import write_navigation_config
+from terrain.session.navigation_config import errors_in_source, write_navigation_config
 from terrain.session.simulation_session import SessionOptions, SimulationSession
 from terrain.session.site import Site
 
@@ -136,7 +136,8 @@ class Session(SimulationSession):
         self.recorder = self._make_recorder()
         self._scans = 0
         self._next_local_map = 0.0
-        super().__init__(simulation, self.localization, config_file, options, delay, self.site.clock)
+        with errors_in_source(source, self.folder, options.settings):
+            super().__init__(simulation, self.localization, config_file, options, delay, self.site.clock)
         self.navigator.server.get_path.listeners.append(self._record_plan)
         self.navigator.server.refine_path.listeners.append(self._record_refined_plan)
         simulation.on_incident.append(self._report_incident)

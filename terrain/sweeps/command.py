@@ -97,7 +97,7 @@ def _print_verdict(console: Console, run: SweepRun, metrics: Mapping[str, Any]) 
     from terrain.commands.verdict_line import TERMINAL_COLOURS
     from terrain.recording.verdict import Level
 
-    text = well_formed(f"seed {run.seed} {run.variant}: {metrics['verdict']}")
+    text = well_formed(f"{f'seed {run.seed} {run.variant}'.rstrip()}: {metrics['verdict']}")
     style = TERMINAL_COLOURS[Level(metrics["level"])]
     console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
 

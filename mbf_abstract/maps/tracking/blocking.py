@@ -63,7 +63,7 @@ def blockages(
     same_storey : float
         Poses farther above or below an object [m] are on another storey.
     """
-    poses = np.array([(pose.x, pose.y, pose.yaw) for pose in path]).reshape(-1, 3)
+    poses = path.planar_poses
     heights = path.positions[:, 2]
     found = []
     for known in objects:

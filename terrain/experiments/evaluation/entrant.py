@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import tempfile
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import yaml
@@ -17,7 +16,7 @@ from mbf_abstract.server.factory import read_config
 from terrain.experiments.evaluation.protocol import Entry, Protocol
 from terrain.provenance.code import hash_of_code, modules_of_plugins, place_of
 from terrain.provenance.named_files import InputCopies, hash_with_named_files, named_files
-from terrain.session.navigation_config import write_navigation_config
+from terrain.session.navigation_config import errors_in_source, write_navigation_config
 
 KINDS = ("planner", "controller")
 OWN = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain")
@@ -60,13 +59,10 @@ def configuration_of(protocol: Protocol, backend: str, settings: Mapping[str, st
     source = scenario.navigation[backend]
     with tempfile.TemporaryDirectory(prefix="mbf_bench_") as name:
         folder = Path(name)
-        try:
+        with errors_in_source(source, folder, settings):
             written = write_navigation_config(source, scenario.robot, {}, folder, settings, InputCopies(folder))
             server, config = read_config(written)
             return config, server.plugin_registry()
-        except ConfigError as error:
-            shown = f"{source.name} (with settings)"
-            raise ConfigError([replace(finding, file=shown) for finding in error.findings]) from error
 
 
 def code_of(config: Config, registry: PluginRegistry, settings: Mapping[str, str]) -> str:

@@ -20,6 +20,7 @@ from mbf_abstract.geometry import (
     quaternions_from_axes,
     rotation_matrix,
 )
+from mbf_abstract.geometry.arcs import poses_on_arc
 from mbf_abstract.geometry.rotations import level_quaternions
 
 angles = st.floats(-20.0, 20.0)
@@ -98,6 +99,35 @@ def test_ten_poses_two_metres_apart_are_eighteen_metres():  # F126
 def test_path_poses_look_at_the_next_different_point(positions):
     path = Path.from_points(positions)
     assert [pose.yaw for pose in path] == pytest.approx(headings(path), abs=1e-9)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_point_or_a_normal_that_is_not_finite_is_named_before_anything_is_computed_of_it(bad):
+    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)]
+    wrong = [(0.0, 0.0, 0.0), (bad, 0.0, 0.0), (bad, 0.0, 0.0)]
+    for normals in (None, points):
+        with pytest.raises(NonFiniteError, match="^pose 1 of the path is not finite: "):
+            Path.from_points(wrong, normals=normals)
+    with pytest.raises(NonFiniteError, match="^normal 1 of the path is not finite: "):
+        Path.from_points(points, normals=wrong)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_planar_poses_have_the_bytes_of_those_of_each_pose(seed):
+    rng = np.random.default_rng(seed)
+    orientations = rng.normal(size=(9, 4))
+    path = Path(rng.normal(size=(9, 3)), orientations / np.linalg.norm(orientations, axis=1)[:, None])
+    assert path.planar_poses.tobytes() == np.array([(pose.x, pose.y, pose.yaw) for pose in path]).tobytes()
+    assert path[:0].planar_poses.shape == (0, 3)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("turn", [0.0, 1e-12, 0.7])
+def test_on_an_arc_that_is_not_driven_the_robot_stays_where_it_is(turn):
+    stays, _, ahead = poses_on_arc((1.0, 2.0, 0.5), 0.3, 0.0, turn, np.array([0.0, 0.0, 0.1])).tolist()
+    assert stays == [1.0, 2.0, 0.5]
+    assert ahead == pytest.approx([1.0 + 0.03 * math.cos(0.5), 2.0 + 0.03 * math.sin(0.5), 0.5 + 0.1 * turn], abs=2e-3)
 
 
 def test_the_last_pose_of_a_path_can_be_given():

@@ -45,7 +45,7 @@ def test_a_behaviour_that_fails_aborts_its_goal_with_its_own_code(make_session):
     handle = session.navigator.send(RecoveryGoal())
     result = handle.wait()
     assert (handle.status, result.outcome) == (GoalStatus.ABORTED, RecoveryOutcome.IMPASSABLE)
-    assert result.message == "recovery 'recovery' failed"
+    assert result.message == "plugin 'recovery' failed with IMPASSABLE and gave no reason"
 
 
 def test_a_behaviour_is_called_once_whatever_it_says(make_session):

@@ -118,9 +118,22 @@ def test_a_run_that_cannot_begin_says_why_without_a_folder_that_has_another_name
     job = load_scenario("crowded_corridor"), SweepRun(0, {"planer_patience": "3"})
     first, again = run_once(job), run_once(job)
     assert first == again and first["outcome"] == "ConfigError"
-    assert (
-        first["message"].startswith("navigation.yaml:") and "planer_patience: expected a known key" in first["message"]
-    )
+    assert "planer_patience: expected a known key" in first["message"]
+
+
+@pytest.mark.parametrize("backend", ["costmap", "mesh"])
+def test_a_mistake_in_a_configuration_is_named_in_the_file_of_the_user(backend, tmp_path):
+    scenario = load_scenario("indoor")
+    file = tmp_path / "mine.yaml"
+    text = scenario.navigation[backend].read_text()
+    file.write_text(f"# of a user\n{text}planer_patience: 3.0\n")
+    job = scenario.model_copy(update={"navigation": {backend: file}}), SweepRun(0, {"backend": backend})
+
+    row = run_once(job)
+
+    line = len(file.read_text().splitlines())
+    assert row["message"].startswith(f"{file}:{line}: planer_patience: expected a known key")
+    assert "navigation.yaml" not in row["message"]
 
 
 @pytest.mark.parametrize("known", [[], [{"variant": "speed=x", "refused": True, "message": "no"}]])
