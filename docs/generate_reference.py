@@ -38,6 +38,7 @@ EXAMPLES = {
     "chase_on_costmap": ("controller", "costmap"),
     "follow_carrot": ("controller", ""),
     "look_around": ("recovery", ""),
+    "dense_poses": ("refiner", ""),
     "flooded_ground": ("layer", "mesh"),
     "wet_floor": ("layer", "costmap"),
 }

@@ -21,7 +21,13 @@ from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.config.installed_plugins import installed_points
 from mbf_abstract.whole_files import write_whole
 
-GROUPS = {"planner": "planners", "controller": "controllers", "recovery": "recoveries", "layer": "{map}_layers"}
+GROUPS = {
+    "planner": "planners",
+    "controller": "controllers",
+    "recovery": "recoveries",
+    "refiner": "refiners",
+    "layer": "{map}_layers",
+}
 """Kind of a plugin -> last word of its entry-point group."""
 EXECUTIVE = "executive"
 KINDS = (*GROUPS, EXECUTIVE)
@@ -49,7 +55,7 @@ def new(
 ) -> None:
     """Write a package: pyproject.toml with its entry point, a module that works, a test that passes.
 
-    A planner and a layer need a map. An executive runs on every one; a controller and a recovery may.
+    A planner and a layer need a map. An executive runs on every one; a controller, a recovery and a refiner may.
     """
     with readable_errors(out):
         package = write_package(kind, name.replace("-", "_"), map_name, out)
@@ -100,7 +106,7 @@ def plugin_source(kind: str, name: str, map_name: str = "") -> str:
         raise ValueError(f"a {kind} needs a map: --map {' or --map '.join(_maps_with(template))}")
     package, path = _place(template, map_name)
     if map_name and on_any_map and not files(package).joinpath(path).is_file():
-        package, path = _place(template, "")  # a recovery is the same on every map, its test is not
+        package, path = _place(template, "")  # such as a recovery: its test is not the same on every map
     return _fill(package, path, name)
 
 

@@ -12,8 +12,10 @@ from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PluginContext
-from mbf_abstract.testing.contract import check_controller, check_planner, check_recovery
+from mbf_abstract.testing.contract import check_controller, check_planner, check_recovery, check_refiner
+from mbf_abstract.testing.contract.rig import rig
 from mbf_abstract.testing.loopback import LoopbackRobot
+from mbf_abstract.time.cancel import CancelToken
 from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
@@ -40,6 +42,10 @@ controllers:
 recovery_behaviors:
   - {name: look, type: "look_around:LookAround"}
 look: {rate: 1.5}
+refiners:
+  - {name: dense, type: "dense_poses:DensePoses"}
+dense: {spacing: 0.03}
+plan_refiner: dense
 mesh_map:
   mesh_file: ground.ply
   layers: [{name: water, type: "flooded_ground:FloodedGround"}]
@@ -56,6 +62,10 @@ controllers:
 recovery_behaviors:
   - {name: look, type: "look_around:LookAround"}
 look: {rate: 1.5}
+refiners:
+  - {name: dense, type: "dense_poses:DensePoses"}
+dense: {spacing: 0.03}
+plan_refiner: dense
 global_costmap: &room
   robot_radius: 0.2
   layers:
@@ -159,6 +169,25 @@ def test_the_controllers_keep_the_contract(target, place):
 )
 def test_the_recoveries_keep_the_contract(target, place):
     check_recovery(load(target), start=Pose.planar(2.0, 2.0), make_context=place)
+
+
+@pytest.mark.parametrize(
+    ("map_name", "target"), [("mesh", "dense_poses:DensePoses"), ("costmap", "dense_poses:DensePoses")]
+)
+def test_the_refiners_keep_the_contract(target, place):
+    check_refiner(load(target), PATH, make_context=place)
+
+
+@pytest.mark.parametrize("map_name", ["mesh", "costmap"])
+def test_dense_poses_keeps_all_poses_and_adds_those_that_are_missing(place):
+    corners = Path.from_points([(1.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.25, 1.0, 0.0), (1.25, 2.0, 0.0)])
+    with rig(load("dense_poses:DensePoses"), place, None, corners[0]) as made:
+        refined = made.plugin.apply_refinement(corners, CancelToken()).path
+
+    # The second pose lies on the first; lines of 0.25 m and 1 m are cut into pieces of at most 0.1 m.
+    assert refined.positions[[0, 1, 4, 14]].tolist() == corners.positions.tolist() and len(refined) == 15
+    assert [pose.yaw for pose in refined] == pytest.approx([0.0] * 4 + [np.pi / 2] * 11)
+    assert np.linalg.norm(np.diff(refined.positions, axis=0), axis=1).max() <= 0.1 + 1e-9
 
 
 @pytest.fixture

@@ -1,4 +1,7 @@
-"""A plugin of any kind fails and gives no reason: the goal's text names the plugin and the outcome."""
+"""Fault table, row 39: a plugin of any kind fails and gives no reason.
+
+The goal's text then names the plugin and the outcome.
+"""
 
 import pytest
 

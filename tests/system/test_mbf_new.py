@@ -17,8 +17,8 @@ from terrain.session.session import Session, SessionOptions
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 INSTALL = ("install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation")
-ON_A_MAP = ("planner", "controller", "recovery", "layer")
-ON_EVERY_MAP = ("controller", "recovery", "executive")
+ON_A_MAP = ("planner", "controller", "recovery", "refiner", "layer")
+ON_EVERY_MAP = ("controller", "recovery", "refiner", "executive")
 
 
 def test_the_tests_of_new_packages_pass(tmp_path):
@@ -143,8 +143,8 @@ def test_the_layers_go_to_the_group_of_their_map(tmp_path):
     ("arguments", "text"),
     [
         (
-            ("refiner", "x", "--map", "mesh"),
-            "no kind 'refiner'; known: planner, controller, recovery, layer, executive",
+            ("critic", "x", "--map", "mesh"),
+            "no kind 'critic'; known: planner, controller, recovery, refiner, layer, executive",
         ),
         (("planner", "x"), "a planner needs a map: --map costmap or --map mesh"),
         (("layer", "x"), "a layer needs a map: --map costmap or --map mesh"),
