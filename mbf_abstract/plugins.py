@@ -283,7 +283,11 @@ class Motion(Protocol):
         """Measured velocity in the base frame; raises RobotStateError."""
 
     def send(self, command: Command) -> bool:
-        """Send one command; False when the gate refused it (lease lost, paused)."""
+        """Send one command; False when the gate refused it (lease lost, paused).
+
+        It holds for ``command_timeout``: the watchdog then stops a robot that has got no other one, also where the
+        driver is still busy with it.
+        """
 
     def sleep(self, seconds: float) -> bool:
         """Wait for so many seconds; False as soon as the behaviour is to end."""

@@ -58,6 +58,11 @@ class CommandWriter:
         """Whether zero was the last command to the robot."""
         return stands_still(self.last_command)
 
+    def silence(self, timeout: float) -> str:
+        """Why the robot is stopped that has had no command for ``timeout`` [s]."""
+        what = "send_command has not returned" if self.busy else "no command"
+        return f"{what} for {self._clock.now() - self.last_time:.3f} s (command_timeout {timeout:g} s)"
+
     def wait_until_free(self, limit: float) -> None:
         """Wait at most ``limit`` [s] for the end of the running call."""
         deadline = self._clock.now() + limit

@@ -247,4 +247,4 @@ class VelocityGate:
                 self._condition.wait(remaining)
                 continue
             self._closing_tries -= self._closed
-            return f"no command for {now - self._writer.last_time:.3f} s"
+            return self._writer.silence(self._command_timeout)

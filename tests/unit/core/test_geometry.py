@@ -107,9 +107,9 @@ def test_a_point_or_a_normal_that_is_not_finite_is_named_before_anything_is_comp
     points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)]
     wrong = [(0.0, 0.0, 0.0), (bad, 0.0, 0.0), (bad, 0.0, 0.0)]
     for normals in (None, points):
-        with pytest.raises(NonFiniteError, match="^pose 1 of the path is not finite: "):
+        with pytest.raises(NonFiniteError, match=r"^pose 1 of the path is not finite: "):
             Path.from_points(wrong, normals=normals)
-    with pytest.raises(NonFiniteError, match="^normal 1 of the path is not finite: "):
+    with pytest.raises(NonFiniteError, match=r"^normal 1 of the path is not finite: "):
         Path.from_points(points, normals=wrong)
 
 

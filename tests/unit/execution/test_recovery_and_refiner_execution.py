@@ -2,6 +2,7 @@
 
 import pytest
 
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Path, Twist
 from mbf_abstract.goals.goal_status import GoalStatus
 from mbf_abstract.goals.goal_types import RecoveryGoal, RefinePathGoal
@@ -46,6 +47,34 @@ def test_a_behaviour_that_fails_aborts_its_goal_with_its_own_code(make_session):
     result = handle.wait()
     assert (handle.status, result.outcome) == (GoalStatus.ABORTED, RecoveryOutcome.IMPASSABLE)
     assert result.message == "plugin 'recovery' failed with IMPASSABLE and gave no reason"
+
+
+@pytest.mark.parametrize(
+    ("driver_takes", "reason"),
+    [
+        (0.0, "no command for 0.500 s (command_timeout 0.5 s)"),
+        (0.8, "send_command has not returned for 0.500 s (command_timeout 0.5 s)"),
+    ],
+)
+def test_a_stop_by_the_watchdog_names_who_is_late_and_the_limit(make_session, monkeypatch, driver_takes, reason):
+    session = make_session()
+    send = session.robot.send_command
+
+    def late_send(command):
+        if not command.is_stopped():
+            session.clock.sleep(driver_takes)
+        send(command)
+
+    def drive_once(request):
+        request.motion.send(Twist.planar(0.3))
+        request.motion.sleep(0.8 - driver_takes)
+        return DONE
+
+    monkeypatch.setattr(session.robot, "send_command", late_send)
+    session.recovery.play(drive_once)
+    assert session.navigator.recover().success
+
+    assert [event.data["reason"] for event in session.recorded(EventKind.ROBOT_STOPPED)][:1] == [reason]
 
 
 def test_a_behaviour_is_called_once_whatever_it_says(make_session):
