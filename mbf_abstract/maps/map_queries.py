@@ -140,6 +140,8 @@ class MapQueries:
     def clear_map(self, local: bool | None = None) -> None:
         """Forget what sensors have marked, and update the maps, the local one first.
 
+        A plan made before the next scan may lead through what is still there. Nothing drives until that scan.
+
         ``local`` chooses the local or the global map only; None = both.
         """
         for served in self._chosen(local):
