@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +13,10 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.leaves import GetPath
 from mbf_abstract.executives.trees.by_motion import MARGIN, blockages_ahead
 from mbf_abstract.geometry import Path
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.goals.result_types import ActionResult, GetPathResult
+from mbf_abstract.maps.queries import CellState
 from mbf_abstract.maps.tracking.objects import Motion
 
 SAME_PLACE = 1.0
@@ -131,9 +134,20 @@ class Detour(UpdatePath):
         if not moving:
             return None
         first, path = ahead[0].distance, self.mission.path_to_follow()
-        back = max(min(first + BEHIND, moving[0]), first + LEAST_BEHIND)  # before who moves, or there is no plan to it
-        behind = int(np.searchsorted(path.length - path.remaining_lengths, back))
+        driven = path.length - path.remaining_lengths
+        nearest, farthest = first + LEAST_BEHIND, min(first + BEHIND, moving[0])  # before who moves
+        begin, end = np.searchsorted(driven, (nearest, max(farthest, nearest))).tolist()
+        fits = self._last_fitting(path[begin : end + 1])
+        behind = len(path) if fits is None else begin + fits
         return path[behind:] if behind < len(path) - 1 else None
+
+    def _last_fitting(self, path: Path) -> int | None:
+        """The last pose with most room for the robot; None where it fits nowhere, as somebody moves there."""
+        with suppress(TransformError):
+            states = [answer.state for answer in self.mission.navigator.server.queries.check_poses(path)]
+            best = min(states, default=CellState.OUTSIDE)
+            return len(states) - 1 - states[::-1].index(best) if best <= CellState.INSCRIBED else None
+        return None
 
     def take_result(self, result: ActionResult) -> None:
         """Keep the path of a success that is not too long, with the rest of the present one where it leads there."""

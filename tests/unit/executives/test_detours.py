@@ -1,5 +1,6 @@
 """What a tree that asks who is in its way does while it drives, on a map that answers what the test says."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -25,11 +26,16 @@ BLOCKED = ControlResult(ExePathOutcome.BLOCKED_PATH, "somebody")
 
 @pytest.fixture
 def on_the_path(monkeypatch):
-    """Let a session's map know these objects, and say how bad its path is."""
+    """Let a session's map know these objects, how bad its path is, and up to where [m] poses are free."""
 
-    def know(session, *blockages, state=CellState.LETHAL):
+    def know(session, *blockages, state=CellState.LETHAL, free_to=math.inf):
         answer = SimpleNamespace(state=state)
+
+        def check_poses(path):
+            return [SimpleNamespace(state=CellState.FREE if pose.x < free_to else CellState.LETHAL) for pose in path]
+
         queries = SimpleNamespace(what_blocks=lambda path, margin: blockages, check_path=lambda *asked: answer)
+        queries.check_poses = check_poses
         monkeypatch.setattr(type(session.server), "queries", queries)
 
     return know
@@ -166,6 +172,15 @@ def test_around_one_that_stands_before_one_that_moves_a_detour_leads_back_to_the
     _, around, *_ = session.planner.requests
     assert around.goal.x == pytest.approx(around.start.x + back, abs=0.15) and around.dist_tolerance == 0.0
     assert session.robot.pose.distance_to(GOAL) < 0.15
+
+
+def test_a_detour_leads_back_to_where_the_robot_fits_and_nowhere_between_both_if_it_does_not(make_session, on_the_path):
+    for free_to, goal in ((2.0, 2.0), (1.0, GOAL.x)):
+        session = make_session()
+        on_the_path(session, somebody(), somebody(Motion.MOVING, 0.0, 5.0), free_to=free_to)
+        creep(session)
+        assert run(session).success
+        assert session.planner.requests[1].goal.x == pytest.approx(goal, abs=0.11)
 
 
 def test_without_a_way_between_both_it_is_planned_to_the_goal(make_session, on_the_path):
