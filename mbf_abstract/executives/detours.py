@@ -123,6 +123,8 @@ class Detour(UpdatePath):
         if status == Status.RUNNING:
             return status
         self.mission.detour_asked = here, now, self._taken
+        if self._taken and self.mission.plan is not None:
+            self.mission.detour_taken = here, self.mission.plan
         return Status.SUCCESS if self._taken else Status.FAILURE
 
     def _path_behind(self) -> Path | None:

@@ -6,6 +6,7 @@ runs never see each other's data and a reader finds every shared value in this f
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from mbf_abstract.actions.stuck_monitor import StuckMonitor
 from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.feedback_types import ExePathFeedback
 from mbf_abstract.goals.handle import AnyGoalHandle
@@ -48,6 +50,8 @@ class MissionContext:
         When [s] a cycle of driving failed last, also one that was tried again.
     detour_asked : tuple of Pose, float and bool, optional
         Where and when [s] a detour was asked for last, and whether it was taken.
+    detour_taken : tuple of Pose and GetPathResult, optional
+        Where the last detour was taken, and its plan.
     stuck : StuckMonitor
         The trouble so far: whether the same failure comes again and again at one place.
     """
@@ -61,6 +65,7 @@ class MissionContext:
     failure: ActionResult | None = None
     refused: float | None = None
     detour_asked: tuple[Pose, float, bool] | None = None
+    detour_taken: tuple[Pose, GetPathResult] | None = None
     stuck: StuckMonitor = field(init=False, repr=False)
     _handles: list[AnyGoalHandle] = field(default_factory=list, repr=False)
 
@@ -86,7 +91,8 @@ class MissionContext:
     def begin(self, target: Pose) -> None:
         """Forget everything about the old target and go to another one."""
         self.target, self.path, self.plan, self.drive = target, None, None, None
-        self.feedback, self.failure, self.refused, self.detour_asked = None, None, None, None
+        self.feedback, self.failure, self.refused = None, None, None
+        self.detour_asked, self.detour_taken = None, None
         self.stuck.restart()
 
     def fail(self, failure: ActionResult) -> None:
@@ -104,6 +110,17 @@ class MissionContext:
             return self.navigator.server.runtime.robot.velocity().speed < speed
         except RobotStateError:
             return False
+
+    def robot_is_near_path(self, distance: float) -> bool:
+        """Whether the robot is within ``distance`` [m] of what is left of its path; True where that is not known."""
+        with suppress(RobotStateError):
+            here = self.robot_pose()
+            if self.path is None or self.path.frame_id != here.frame_id:
+                return True
+            tracker = PathTracker(self.path_to_follow())
+            tracker.update((here.x, here.y, here.z))
+            return tracker.deviation <= distance
+        return True
 
     def controller_has_refused_within(self, seconds: float) -> bool:
         """Whether a cycle of driving along the mission's path has failed in the last ``seconds``."""

@@ -28,6 +28,7 @@ from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.executives.pacing import Delay, InBackground
 from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
 from mbf_abstract.executives.trees.by_motion import MARGIN, EndDrive, PickByMotion, first_in_the_way
+from mbf_abstract.executives.trees.giving_way import give_way
 from mbf_abstract.executives.trees.options import TreeOptions
 from mbf_abstract.executives.trees.overtaking import IsHeldUp, Overtake
 from mbf_abstract.executives.watchdogs import MotorWatchdog, OscillationWatchdog, ProgressWatchdog
@@ -196,8 +197,9 @@ def _patient(name: str, options: TreeOptions, waits: int) -> Behaviour:
     """Around one that stands, else wait so often, then give way."""
     o = options
     nodes: list[Behaviour] = [Recovery(o.wait, f"wait {number + 1}") for number in range(waits)]
-    around = [_detour("plan around it", o, o.planner)] if o.reuse_path else []
-    return RoundRobin(name, [*around, *nodes, Recovery(o.give_way)])
+    if not o.reuse_path:  # every recovery that succeeds is followed by a plan
+        return RoundRobin(name, [*nodes, Recovery(o.give_way)])
+    return RoundRobin(name, [_detour("plan around it", o, o.planner), *nodes, give_way(o)])
 
 
 def _in_turn(name: str, *behaviors: str) -> RoundRobin:

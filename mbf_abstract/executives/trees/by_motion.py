@@ -138,9 +138,9 @@ class EndDrive(Leaf):
 
     def _passes(self) -> bool:
         """Whether the robot drives a detour that was taken near here."""
-        asked = self.mission.detour_asked
-        if asked is None or not asked[2]:
+        taken = self.mission.detour_taken
+        if taken is None or self.mission.plan is not taken[1]:
             return False
         with suppress(RobotStateError):
-            return asked[0].distance_to(self.mission.robot_pose()) <= LONGEST_PASSING
+            return taken[0].distance_to(self.mission.robot_pose()) <= LONGEST_PASSING
         return True

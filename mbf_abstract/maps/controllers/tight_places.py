@@ -40,7 +40,9 @@ CLOSELY = 0.005
 SLIGHT_TURN = 0.005
 """By less than this [rad] a robot that is driven closely does not turn on the spot."""
 KEPT = 0.05
-"""An answer holds until the robot has come so far [m] on its path."""
+"""An answer holds until the robot has come so far [m] on its path, or nearer to it."""
+BESIDE = 0.2
+"""What a robot is farther off its path [m] it has to drive before it comes to a tight place."""
 
 Fits = Callable[[float, float, float], bool]
 """Whether the outline touches nothing at a pose (x, y [m], yaw [rad])."""
@@ -50,9 +52,10 @@ class TightPlaces:
     """What lies ahead on one path."""
 
     def __init__(self) -> None:
-        self._asked_at = -math.inf
+        self._asked_at = (-math.inf, 0.0)  # progress and deviation [m]
         self._next = math.inf
         self._close_until = -math.inf
+        self._close_beside = 0.0  # deviation [m] with which that was noted
 
     def shifted(self, shift: float, tracker: PathTracker) -> TightPlaces:
         """Return those of a path on which lengths [m] have grown by ``shift``; what lies ahead is looked at anew.
@@ -61,11 +64,13 @@ class TightPlaces:
         """
         moved = TightPlaces()
         if self._close_until < math.inf or _ends_near(tracker):
-            moved._close_until = self._close_until + shift
+            moved._close_until, moved._close_beside = self._close_until + shift, self._close_beside
         return moved
 
     def distance(self, tracker: PathTracker, reverses: bool, fits: Fits, reach: float = REACH) -> float:
-        """Length [m] along the path to the next tight place, whatever cusps lie between; inf = none within ``reach``.
+        """Length [m] to drive to the next tight place, whatever cusps lie between; inf = none within ``reach``.
+
+        A robot that comes back to its path, from where it let somebody pass, need not creep from there.
 
         Parameters
         ----------
@@ -76,15 +81,16 @@ class TightPlaces:
         """
         if self.is_close(tracker):
             return 0.0
-        if tracker.progress - self._asked_at >= KEPT:
-            self._asked_at = tracker.progress
+        progress, deviation = self._asked_at
+        if tracker.progress - progress >= KEPT or abs(tracker.deviation - deviation) >= KEPT:
+            self._asked_at = tracker.progress, tracker.deviation
             lengths = np.arange(tracker.progress, min(tracker.progress + reach, tracker.length), SPACING)
             poses = _poses_at(tracker, lengths, reverses).tolist()
             first = next((k for k, (x, y, yaw) in enumerate(poses) if not has_room(x, y, yaw, fits)), None)
             is_tight = first is not None and (fits(*poses[first]) or _fits_as_planned(tracker, lengths[first], fits))
             gap = float(lengths[first]) if is_tight else math.inf
             self._next = min(gap, _next_cusp(tracker, fits, reach))
-        return max(self._next - tracker.progress, 0.0)
+        return max(self._next - tracker.progress, 0.0) + max(tracker.deviation - BESIDE, 0.0)
 
     def drives_otherwise(self, tracker: PathTracker, wanted: Twist, command: Command | None) -> bool:
         """Take note of what is driven instead of a wanted motion; whether the motions are to be chosen anew, closely.
@@ -96,16 +102,20 @@ class TightPlaces:
             return False
         if command.vx == 0.0:
             if command.wz != 0.0:
-                self._close_until = max(self._close_until, tracker.progress + KEPT)
+                self._drive_closely_until(tracker, max(self._close_until, tracker.progress + KEPT))
             return False
         near_end = wanted.vx != 0.0 and _ends_near(tracker)
         is_new = near_end and self._close_until < math.inf
-        self._close_until = math.inf if near_end else self._close_until
+        if is_new:
+            self._drive_closely_until(tracker, math.inf)
         return is_new
 
+    def _drive_closely_until(self, tracker: PathTracker, length: float) -> None:
+        self._close_until, self._close_beside = length, tracker.deviation
+
     def is_close(self, tracker: PathTracker) -> bool:
-        """Whether a robot on the path, or beside it, keeps to it closely for what it drove before."""
-        return tracker.progress < self._close_until
+        """Whether a robot on the path, or beside it, keeps to it closely for what it drove before, near there."""
+        return tracker.progress < self._close_until and abs(tracker.deviation - self._close_beside) < BESIDE
 
     @staticmethod
     def begin_next_stroke(tracker: PathTracker) -> bool:

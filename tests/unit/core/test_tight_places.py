@@ -130,6 +130,21 @@ def test_an_answer_holds_until_the_robot_has_come_on():
     assert len(asked) > before
 
 
+def test_a_robot_that_comes_back_to_its_path_from_beside_it_has_so_much_farther_to_a_tight_place():
+    places, tracker = TightPlaces(), tracker_at(0.5)
+    for beside, farther in ((1.4, 1.2), (0.15, 0.0)):
+        tracker.update((0.5, beside))
+        assert places.distance(tracker, True, gap(1.2, 2.0, 0.0, 0.0)) == pytest.approx(0.7 + farther, abs=0.1)
+
+
+def test_while_it_comes_back_the_robot_sees_that_who_made_the_place_tight_has_gone():
+    places, tracker = TightPlaces(), tracker_at(0.5)
+    tracker.update((0.5, 1.4))
+    assert places.distance(tracker, True, gap(0.6, 2.0, 0.0, 0.0)) < math.inf
+    tracker.update((0.5, 1.4 - 1.1 * KEPT))
+    assert places.distance(tracker, True, lambda x, y, yaw: True) == math.inf
+
+
 WANTED, CURVE, TURN = Twist.planar(0.5, wz=0.3), Twist.planar(0.1, wz=0.2), Twist.planar(wz=0.4)
 
 

@@ -10,13 +10,14 @@ from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.executives.trees.by_motion import EndDrive
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.maps.tracking.blocking import Blockage
 from mbf_abstract.maps.tracking.objects import Motion
-from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
-from mbf_abstract.plugins import ControlResult, PlanResult
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
+from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult
 from mbf_abstract.testing.faulty import drive
-from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.testing.scripted import ScriptedRecovery, straight_plan
 
 OPTIONS = TreeOptions(check_poses=False, wait="relax", give_way="back_up")
 GOAL = Pose.planar(6.0, 0.0)
@@ -141,7 +142,7 @@ def test_one_that_stopped_earlier_than_it_seemed_did_not_stop_for_the_robot(tick
             navigator=SimpleNamespace(server=server),
             path=(),
             path_to_follow=tuple,
-            detour_asked=None,
+            detour_taken=None,
             fail=failures.append,
         )
     )
@@ -159,6 +160,41 @@ def test_before_one_that_came_along_the_path_giving_way_is_the_first_recovery(
     session.planner.play(straight_plan, NO_PATH)
     assert run(session, replace(OPTIONS, second_planner_pause=0.0)).success
     assert recoveries(session) == recovery
+
+
+@pytest.mark.parametrize(
+    ("beside", "answer", "plans"),
+    [(1.0, straight_plan, 3), (1.0, NO_PATH, 3), (0.2, straight_plan, 2)],
+    ids=["off the path", "no path from there", "on the path"],
+)
+def test_who_gave_way_beside_its_path_plans_anew_and_keeps_its_path_where_there_is_none(
+    make_session, recoveries, on_the_path, beside, answer, plans
+):
+    session = make_session()
+    on_the_path(session, somebody(along=-1.0))
+
+    def give_way(request):
+        session.robot.T_map_odom = Transform((0.0, beside, 0.0), parent="map", child="odom")
+        return RecoveryResult(RecoveryOutcome.SUCCESS, "gave way")
+
+    session.plugin("back_up", ScriptedRecovery).play(give_way)
+    session.controller.play(BLOCKED, session.controller.follow)
+    session.planner.play(straight_plan, NO_PATH, answer)  # there is no detour
+    assert run(session, replace(OPTIONS, second_planner_pause=0.0)).success
+    assert recoveries(session) == ["back_up"]
+    assert len(session.planner.requests) == plans
+    assert session.robot.pose.distance_to(GOAL) < 0.15
+
+
+def test_a_drive_on_a_detour_goes_on_although_another_one_was_asked_for_and_not_taken(
+    make_session, recoveries, on_the_path
+):
+    session = make_session()
+    on_the_path(session, somebody(standing=8.0, along=-1.0))
+    creep(session, 60)
+    session.planner.play(straight_plan, straight_plan, NO_PATH)
+    assert run(session).success
+    assert len(session.planner.requests) > 2 and recoveries(session) == []
 
 
 @pytest.mark.parametrize(("moves", "back"), [(5.0, 3.0), (2.4, 2.4), (1.3, 1.8)], ids=["far", "near", "too near"])
