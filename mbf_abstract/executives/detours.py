@@ -37,13 +37,28 @@ class UpdatePath(GetPath):
     ----------
     longest : float
         A path that is longer than this many times the rest of the present one is not taken; waiting is better then.
+    once : bool
+        A plan that fails is not tried again: the robot has a path, and who stands in its way may be gone before that.
     """
 
     def __init__(
-        self, name: str = "update path", planner: str = "", slot: int = 0, longest: float = math.inf, refiner: str = ""
+        self,
+        name: str = "update path",
+        planner: str = "",
+        slot: int = 0,
+        longest: float = math.inf,
+        refiner: str = "",
+        *,
+        once: bool = False,
     ) -> None:
         super().__init__(name, planner, slot=slot, refiner=refiner)
         self.longest = longest
+        self.once = once
+
+    def make_goal(self) -> GetPathGoal:
+        """Plan from where the robot is."""
+        goal = super().make_goal()
+        return replace(goal, max_retries=0) if self.once else goal
 
     def take_result(self, result: ActionResult) -> None:
         """Keep the path of a success only."""
@@ -85,7 +100,7 @@ class Detour(UpdatePath):
         asked_again: float,
         taken_pause: float = TAKEN_PAUSE,
     ) -> None:
-        super().__init__(name, planner, slot, longest, refiner)
+        super().__init__(name, planner, slot, longest, refiner, once=True)
         self.asked_again = asked_again
         self.taken_pause = taken_pause
         self._taken = False
@@ -97,8 +112,8 @@ class Detour(UpdatePath):
         self._taken, self._rest = False, None
 
     def make_goal(self) -> GetPathGoal:
-        """Plan once: the robot has a path, and who stands in its way may be gone before a second plan is made."""
-        goal = replace(super().make_goal(), max_retries=0)
+        """Plan to the goal, or to the path behind who stands on it."""
+        goal = super().make_goal()
         return goal if self._rest is None else replace(goal, target_pose=self._rest[0], dist_tolerance=0.0)
 
     def update(self) -> Status:

@@ -22,6 +22,6 @@ def give_way(options: TreeOptions) -> Behaviour:
     """Let somebody pass; where that led off the path, plan anew, as the path may lead around who has left since."""
     o = options
     on_path = Do("still on its path?", lambda mission: mission.robot_is_near_path(OFF_PATH))
-    anew = UpdatePath("plan from there", o.planner, longest=o.longest_update, refiner=o.refiner)
+    anew = UpdatePath("plan from there", o.planner, longest=o.longest_update, refiner=o.refiner, once=True)
     path = Selector("path from there", memory=True, children=[on_path, anew, Success("keeps its path")])
     return Sequence("give way", memory=True, children=[Recovery(o.give_way), path])

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import replace
 
 import numpy as np
 from py_trees.common import Status
@@ -21,7 +20,6 @@ from mbf_abstract.executives.nodes import Leaf
 from mbf_abstract.executives.trees.by_motion import MARGIN, first_in_the_way
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
-from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.goals.result_types import ActionResult, GetPathResult
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.maps.tracking.blocking import ALONG, Blockage
@@ -118,14 +116,10 @@ class Overtake(UpdatePath):
     """Plan past those who hold the robot up; fails where the path is long, or does not keep clear of them."""
 
     def __init__(self, name: str, planner: str, slot: int, longest: float, refiner: str) -> None:
-        super().__init__(name, planner, slot, longest, refiner)
+        super().__init__(name, planner, slot, longest, refiner, once=True)
         self._asked: tuple[Pose, float] | None = None  # where, and when [s], the last plan was asked for
         self._taken = False
         self._in_a_row = 0
-
-    def make_goal(self) -> GetPathGoal:
-        """Plan once: the robot has a path."""
-        return replace(super().make_goal(), max_retries=0)
 
     def update(self) -> Status:
         """Plan, unless that was done a short way or time ago."""

@@ -170,7 +170,7 @@ def test_before_one_that_came_along_the_path_giving_way_is_the_first_recovery(
 def test_who_gave_way_beside_its_path_plans_anew_and_keeps_its_path_where_there_is_none(
     make_session, recoveries, on_the_path, beside, answer, plans
 ):
-    session = make_session()
+    session = make_session(planner_max_retries=-1, planner_patience=2.0)
     on_the_path(session, somebody(along=-1.0))
 
     def give_way(request):
