@@ -21,7 +21,8 @@ def replacing(file: str | os.PathLike[str]) -> Iterator[Path]:
         os.replace(part, file)
     except OSError as error:
         if error.errno is not None and error.filename in (None, part, str(part)):  # None: the disk is full
-            error.filename, error.filename2 = str(file), None
+            error.filename = str(file)
+            del error.filename2  # with None instead of it the text would end with "-> None"
         raise
     finally:
         part.unlink(missing_ok=True)

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.commands.waiting import waiting
 from mbf_mesh_nav.tiles.command import tile
+
+if TYPE_CHECKING:
+    from mbf_mesh_nav.building.surface import SurfaceParameters
+
+OPTIONS = {"decimation_bound": "--decimate"}
+"""Options whose name is not that of the parameter."""
 
 
 def register(app: typer.Typer) -> None:
@@ -64,11 +72,14 @@ def build(
     with readable_errors(out):
         from mbf_mesh_nav.building.map_build import build_map
         from mbf_mesh_nav.building.map_facts import lines_of
-        from mbf_mesh_nav.building.surface import SurfaceParameters
+        from mbf_mesh_nav.building.report import refuse_report, write_report
+        from mbf_mesh_nav.mesh.mesh_report import MeshError
 
         if up not in ("", "x", "y", "z"):
             raise typer.BadParameter(f"expected x, y or z, got {up!r}", param_hint="--up")
-        parameters = SurfaceParameters(
+        if not scale < math.inf:
+            raise typer.BadParameter(f"expected a finite length, got {scale}", param_hint="--scale")
+        parameters = _surface_parameters(
             cell=cell,
             clearance=clearance,
             step_height=step_height,
@@ -76,6 +87,12 @@ def build(
             least_area=least_area,
             decimation_bound=decimate,
         )
+        for folder in from_run:
+            if not folder.is_dir():
+                got = "expected the folder of a run, got a file" if folder.exists() else "there is no such folder"
+                raise MeshError(str(folder), [got])
+        if report is not None:
+            refuse_report(report)
         files = [*(inputs or ()), *from_run]
         with waiting("reading") as say:
             facts, surface, cloud = build_map(
@@ -90,8 +107,6 @@ def build(
                 on_step=say,
             )
             if report is not None:
-                from mbf_mesh_nav.building.report import write_report
-
                 say("planning between the farthest places")
                 plan = write_report(report, files, out, facts, surface, cloud)
                 notes = (*cloud.notes, f"test plan by {plan.text}")
@@ -104,3 +119,19 @@ def build(
         typer.echo(f"note: {note}", err=True)
     for name, text in lines_of(facts):
         typer.echo(f"{name:12} {text}")
+
+
+def _surface_parameters(**values: float) -> SurfaceParameters:
+    """Parameters of a surface; the option of the first value that is not legal is named."""
+    from pydantic import ValidationError
+
+    from mbf_abstract.config.mistakes import mistakes_of
+    from mbf_mesh_nav.building.surface import SurfaceParameters
+
+    try:
+        return SurfaceParameters.model_validate(values)
+    except ValidationError as error:
+        wrong = mistakes_of(SurfaceParameters, values, error.errors(include_url=False))[0]
+        name = str(wrong.loc[0])
+        hint = OPTIONS.get(name, f"--{name.replace('_', '-')}")
+        raise typer.BadParameter(f"expected {wrong.expected}, got {wrong.got}", param_hint=hint) from error

@@ -132,4 +132,4 @@ def write_map(
             file.write(vertex_records(vertices, errors))
             file.write(records.tobytes())
     except OSError as error:
-        raise MeshError(str(out), [f"cannot be written: {error}"]) from error
+        raise MeshError(str(out), [f"cannot be written: {error.strerror or error}"]) from error

@@ -38,6 +38,23 @@ figcaption {{ color: #555; font-size: 13px }} .failed {{ color: #b00020 }}
 </div>
 </body></html>
 """
+PAGE_ENDINGS = (".html", ".htm")
+
+
+def refuse_report(file: Path) -> None:
+    """Refuse a name for the report before anything is built.
+
+    Raises
+    ------
+    MeshError
+        It is not that of a page, or its folder is not there.
+    """
+    if file.suffix.lower() not in PAGE_ENDINGS:
+        raise MeshError(str(file), [f"a report is written as {PAGE_ENDINGS[0]}, not as '{file.suffix}'"])
+    if not file.parent.is_dir():
+        raise MeshError(str(file), ["there is no such folder"])
+    if file.is_dir():
+        raise MeshError(str(file), ["expected a file, got a folder"])
 
 
 def write_report(
@@ -70,7 +87,7 @@ def write_report(
     try:
         write_whole(file, page)
     except OSError as error:
-        raise MeshError(str(file), [f"cannot be written: {error}"]) from error
+        raise MeshError(str(file), [f"cannot be written: {error.strerror or error}"]) from error
     return plan
 
 

@@ -142,7 +142,7 @@ def write_index(folder: Path, index: TileIndex) -> None:
     try:
         write_whole(path, json.dumps(index.model_dump(mode="python"), indent=1))
     except OSError as error:
-        raise MeshError(str(path), [f"cannot be written: {error}"]) from error
+        raise MeshError(str(path), [f"cannot be written: {error.strerror or error}"]) from error
 
 
 def is_tile_folder(folder: Path) -> bool:

@@ -108,7 +108,7 @@ def write_tile(path: Path, tile: Tile) -> None:
         with replacing(path) as unfinished:
             np.savez(unfinished, **{field.name: getattr(tile, field.name) for field in fields(tile)})
     except OSError as error:
-        raise MeshError(str(path), [f"cannot be written: {error}"]) from error
+        raise MeshError(str(path), [f"cannot be written: {error.strerror or error}"]) from error
 
 
 def read_tile(path: Path) -> Tile:

@@ -37,9 +37,10 @@ def read_pcd_points(path: Path, max_points: int) -> StoredPoints:
         header = _read_header(path, file)
         try:
             record = _record(header)
-            width, height = int(header["WIDTH"][0]), int(header["HEIGHT"][0])
-            count, form = int(header.get("POINTS", [str(width * height)])[0]), header["DATA"][0]
-        except (LookupError, ValueError) as error:
+            width, height = _whole(header, "WIDTH"), _whole(header, "HEIGHT")
+            count = _whole(header, "POINTS") if "POINTS" in header else width * height
+            form = " ".join(header["DATA"])
+        except ValueError as error:
             raise MeshError(str(path), [f"its header is not a PCD header: {error}"]) from error
         if count != width * height:
             raise MeshError(str(path), [f"POINTS {count} is not WIDTH {width} x HEIGHT {height}"])
@@ -70,15 +71,27 @@ def _read_header(path: Path, file: BinaryIO) -> dict[str, list[str]]:
     raise MeshError(str(path), ["is not a PCD file: there is no DATA line in its header"])
 
 
+def _whole(header: dict[str, list[str]], key: str) -> int:
+    """The number of a line; raises ValueError where that is none."""
+    text = " ".join(header.get(key, ["no such line"]))
+    if not text.isdecimal():
+        raise ValueError(f"{key}: expected a whole number, got '{text:.40}'")
+    return int(text)
+
+
 def _record(header: dict[str, list[str]]) -> np.dtype[np.void]:
-    """Type of one point; raises LookupError or ValueError for a header that does not fit together."""
-    names, sizes, kinds = header["FIELDS"], header["SIZE"], header["TYPE"]
-    counts = header.get("COUNT", ["1"] * len(names))
+    """Type of one point; raises ValueError for lines that are missing, wrong or do not fit together."""
+    names = header.get("FIELDS", [])
+    lines = {"SIZE": header.get("SIZE", []), "TYPE": header.get("TYPE", [])}
+    lines["COUNT"] = header.get("COUNT", ["1"] * len(names))
+    for key, words in lines.items():
+        if len(words) != len(names):
+            raise ValueError(f"{key}: expected {len(names)} values, one for each of FIELDS, got {len(words)}")
     fields = []
-    for number, (name, size, kind, count) in enumerate(zip(names, sizes, kinds, counts, strict=True)):
-        if int(size) not in LENGTHS[kind] or int(count) < 0:
-            raise ValueError(f"field {name:.40}: TYPE {kind} of SIZE {size} x {count}")
-        unique = name if name in "xyz" else f"{name}_{number}"  # padding is called "_" as often as it occurs
+    for number, (name, size, kind, count) in enumerate(zip(names, *lines.values(), strict=True)):
+        if size not in map(str, LENGTHS.get(kind, ())) or not count.isdecimal():
+            raise ValueError(f"field {name:.40}: TYPE {kind:.40} of SIZE {size:.40} x {count:.40}")
+        unique = f"{name}_{number}" if names.count(name) > 1 else name  # padding is called "_" as often as it occurs
         form = f"<{KINDS[kind]}{int(size)}"
         fields.append((unique, form) if int(count) == 1 else (unique, form, (int(count),)))
     record = np.dtype(fields)

@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, coordinates, read_records, refuse_count
+from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, bytes_left, coordinates, read_records, refuse_count
 from mbf_mesh_nav.building.clouds.text_points import read_rows
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
@@ -87,12 +87,12 @@ def _read_header(path: Path, file: BinaryIO) -> tuple[str, list[_Element]]:
                 elements[-1].has_lists = True
             elif words[:1] == ["property"]:
                 elements[-1].properties.append((words[2], TYPES[words[1]]))
-            elif words[:1] == ["end_header"]:
+            elif words[:1] == ["end_header"] or bytes_left(file) == 0:
                 break
-        else:
-            raise MeshError(str(path), ["the file is cut off within its header: there is no end_header"])
     except (LookupError, ValueError) as error:
         raise MeshError(str(path), [f"its header has a line that is not PLY: {' '.join(words)!r:.80}"]) from error
+    if words[:1] != ["end_header"]:
+        raise MeshError(str(path), ["the file is cut off within its header: there is no end_header"])
     if form != "ascii" and form not in BYTE_ORDERS:
         raise MeshError(str(path), [f"unknown format {form!r:.40}; known: ascii, {', '.join(BYTE_ORDERS)}"])
     return form, elements

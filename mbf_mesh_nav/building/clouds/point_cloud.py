@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from mbf_abstract.config.bounded_files import special_file
+from mbf_abstract.config.findings import text_of
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.building.clouds.coordinate_system import given_system
 from mbf_mesh_nav.building.clouds.las_points import read_las_points
@@ -109,14 +110,15 @@ def read_clouds(
     Raises
     ------
     MeshError
-        A file cannot be read, holds points that are not finite, or coordinates that are no metres; or the files have
-        different units or coordinate systems, or ``crs`` is none or contradicts what a file states.
+        A file cannot be read, is given twice, holds points that are not finite, or coordinates that are no metres; or
+        the files have different units or coordinate systems, or ``crs`` is none or contradicts what a file states.
     """
     system = given_system(crs)
     if not files:
         raise MeshError("point cloud", ["there is no input file"])
     parts, notes, stated = list[FloatArray](), list[str](), dict[Path, float]()
     systems = dict[str, str]()
+    _refuse_twice(files)
     for file in files:
         on_file(file)
         stored, is_on_map = _read(file, max_points - sum(map(len, parts)), up_axis, unit, clearance)
@@ -140,6 +142,15 @@ def read_clouds(
     cloud = parts[0] if len(parts) == 1 else np.concatenate(parts)
     x, y, z = origin.tolist()
     return PointCloud(cloud, (x, y, z), stated[files[0]] or 1.0, tuple(notes), system or next(iter(systems), ""))
+
+
+def _refuse_twice(files: Sequence[Path]) -> None:
+    """Refuse a file that is given twice: its points would count twice in density, noise and errors."""
+    seen = set[Path]()
+    for file in files:
+        if (place := file.resolve()) in seen:
+            raise MeshError(str(file), ["is given twice"])
+        seen.add(place)
 
 
 def _judge_systems(systems: dict[str, str], given: str, crs: str) -> list[str]:
@@ -186,7 +197,7 @@ def _read(file: Path, max_points: int, up_axis: str, unit: float, clearance: flo
     except (OSError, MemoryError, ValueError) as error:
         if isinstance(error, MeshError):
             raise
-        raise MeshError(str(file), [f"cannot be read: {error}"]) from error
+        raise MeshError(str(file), [f"cannot be read: {text_of(error).removeprefix(f'{file}: ')}"]) from error
     refuse_count(file, len(stored.points), max_points)
     if len(stored.points) == 0:
         raise MeshError(str(file), ["there is no point in it"])

@@ -197,7 +197,7 @@ def _prepare(folder: Path, build: str) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise MeshError(str(folder), [f"cannot be made: {error}"]) from error
+        raise MeshError(str(folder), [f"cannot be made: {error.strerror or error}"]) from error
     if (folder / INDEX_FILE).exists() and read_index(folder).build != build:
         raise MeshError(str(folder), ["holds a map of another source or with other settings; give another folder"])
     for unfinished in folder.glob(".tile_*.npz"):

@@ -22,6 +22,20 @@ from mbf_mesh_nav.building.clouds.point_cloud import read_clouds
 from mbf_mesh_nav.kernels.building.lzf import lzf_decompress
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
+PCD = (
+    b"VERSION 0.7\nFIELDS a y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA binary\n"
+    + bytes(24)
+)
+PCD_MISTAKES = [
+    (b"SIZE 4 4 4", b"SIZE 4 4", "SIZE: expected 3 values, one for each of FIELDS, got 2"),
+    (b"TYPE F F F", b"", "TYPE: expected 3 values, one for each of FIELDS, got 0"),
+    (b"TYPE F F F", b"TYPE F Q F", "field y: TYPE Q of SIZE 4 x 1"),
+    (b"COUNT 1 1", b"COUNT 1 -1", "field y: TYPE F of SIZE 4 x -1"),
+    (b"WIDTH 2", b"WIDTH many", "WIDTH: expected a whole number, got 'many'"),
+    (b"HEIGHT 1\n", b"", "HEIGHT: expected a whole number, got 'no such line'"),
+    (b"DATA binary", b"DATA", "DATA: expected ascii, binary or binary_compressed, got ''"),
+    (b"", b"", "its points have no x; they have: a, y, z"),
+]
 UTM = np.array([498_765.0, 5_432_100.0, 0.0])
 EAST = np.array([1.0, 0.0, 0.0])
 WRITERS = {
@@ -311,7 +325,8 @@ def test_files_far_from_each_other_are_refused_by_name(tmp_path):
         ("a.ply", PLY_HEAD + b"element vertex 9\nend_header\n", "its points have no properties"),
         ("a.ply", TEXT_HEAD + b"element a 999999999999\n" + VERTEX + b"end_header\n", "cut off before its points"),
         ("a.ply", PLY_HEAD + b"element vertex 9\n" + 2 * b"property float x\n" + b"end_header\n", "cannot be read"),
-        ("a.pcd", b"VERSION 0.7\nFIELDS x y\nSIZE 4\nTYPE F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2\n", "not a PCD header"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "cut off within its header: there is no end_header"),
+        *(("a.pcd", PCD.replace(old, new), text) for old, new, text in PCD_MISTAKES),
         ("a.pcd", b"nothing", "is not a PCD"),
         ("a.las", b"LASF" + bytes(100), "cut off within its header: expected at least 227 bytes, found 104"),
         ("a.las", bytes(300), "is cut off, damaged or no LAS"),
@@ -322,6 +337,13 @@ def test_a_file_that_is_not_what_its_name_says_is_refused(tmp_path, name, conten
     file = tmp_path / name
     file.write_bytes(content)
     assert text in refusal(file)
+
+
+def test_a_file_that_is_given_twice_is_refused_by_whatever_name(tmp_path):
+    file = write_text(tmp_path / "scan.xyz", POINTS)
+    (tmp_path / "link.xyz").symlink_to(file)
+    with pytest.raises(MeshError, match=r"link\.xyz: is given twice"):
+        read_clouds([file, tmp_path / "link.xyz"])
 
 
 def test_a_missing_file_and_a_pipe_are_refused(tmp_path):

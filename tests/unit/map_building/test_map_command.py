@@ -159,6 +159,12 @@ def test_where_a_map_cannot_be_written_it_is_not_begun(tmp_path, survey):
     assert steps == []
 
 
+def test_a_map_that_is_a_folder_already_is_named_once(tmp_path, survey):
+    (tmp_path / "map.ply").mkdir()
+    with pytest.raises(MeshError, match=r"map\.ply: cannot be written: Is a directory$"):
+        build_map(survey, tmp_path / "map.ply")
+
+
 def test_a_package_that_decimation_needs_is_asked_for_before_a_file_is_read(tmp_path, monkeypatch):
     monkeypatch.setattr(decimation, "find_spec", lambda name: None)
     done = run("map", "build", tmp_path / "none.las", "--out", tmp_path / "map.ply", "--decimate", "0.02")
@@ -170,7 +176,12 @@ def test_a_package_that_decimation_needs_is_asked_for_before_a_file_is_read(tmp_
     ("arguments", "text"),
     [
         (["--up", "w"], "expected x, y or z, got 'w'"),
-        (["--step-height", "-1"], "error: step_height: input should be greater than or equal to 0.02, got -1.0"),
+        (["--step-height", "-1"], "Invalid value for --step-height: expected a number >= 0.02 and <= 2 m, got -1.0"),
+        (["--decimate", "5"], "Invalid value for --decimate: expected a number >= 0 and <= 1 m, got 5.0"),
+        (["--scale", "inf"], "Invalid value for --scale: expected a finite length, got inf"),
+        (["--from-run", "nowhere"], "error: nowhere: there is no such folder"),
+        (["--report", "nowhere/page.html"], "error: nowhere/page.html: there is no such folder"),
+        (["--report", "map.ply"], "error: map.ply: a report is written as .html, not as '.ply'"),
         (["--max-points", "10"], "the limit is 10 (max_points)"),
     ],
 )
