@@ -59,7 +59,7 @@ def replay(
         from mbf_ros.bags.reading import open_bag
         from mbf_ros.bags.replay import replay_bag
         from mbf_ros.bags.replay_options import ReplayOptions
-        from mbf_ros.bags.report import report_of, result_line, statistics_of
+        from mbf_ros.bags.report import missing_notes, report_of, result_line, statistics_of
 
         options = ReplayOptions(_pairs(topic), _transforms(tf), odom_tf, map_name, place, at, planner, every)
         folder = out or Path("replays") / bag.resolve().stem
@@ -73,13 +73,14 @@ def replay(
             if replayed.plan is not None:
                 _write_json(folder / "plan.json", replayed.plan)
             problems = write_drive_log(folder, replayed.log, report_of(replayed))
-        for problem in problems:
+        for problem in (*missing_notes(replayed), *problems):
             typer.echo(f"note: {problem}", err=True)
         if as_json:
             typer.echo(json.dumps({**statistics_of(replayed), "plan": replayed.plan, "folder": str(folder)}))
         else:
             typer.echo(result_line(replayed))
-            typer.echo(f"results in {folder}: report.html, statistics.json, run.mcap, map_*.png")
+            plan = "" if replayed.plan is None else " plan.json,"
+            typer.echo(f"results in {folder}: report.html, statistics.json,{plan} run.mcap, map_*.png")
     if _has_failed(replayed):
         raise typer.Exit(FAILURE)
 
@@ -190,10 +191,9 @@ def _transforms(texts: list[str]) -> tuple[Transform, ...]:
         parent, _, child = names.partition(":")
         try:
             x, y, z, yaw = (float(number) for number in numbers.split(","))
-            pose = Pose.planar(x, y, yaw, z)
+            pose, frames = Pose.planar(x, y, yaw, z), (parent.lstrip("/"), child.lstrip("/"))
+            found.append(Transform(pose.position, pose.orientation, *frames, static=True))
         except ValueError as error:
-            expected = "PARENT:CHILD=X,Y,Z,YAW in metres and radians"
+            expected = "PARENT:CHILD=X,Y,Z,YAW of two frames, in metres and radians"
             raise typer.BadParameter(f"expected {expected}, got {text!r}", param_hint="--tf") from error
-        parent, child = parent.lstrip("/"), child.lstrip("/")
-        found.append(Transform(pose.position, pose.orientation, parent, child, static=True))
     return tuple(found)

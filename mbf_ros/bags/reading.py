@@ -182,4 +182,4 @@ def _by_field_name(value: Any, store: Any) -> Any:
 
 
 def _reason(error: Exception) -> str:
-    return error_text(error).rstrip(".") or type(error).__name__
+    return " ".join(error_text(error).split()).rstrip(".") or type(error).__name__

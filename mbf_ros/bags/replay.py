@@ -48,6 +48,8 @@ class Replayed:
         Statistics.
     poses_unknown : int
         Samples of a tenth of a second at which the robot's pose was unknown or old.
+    sources_without_topic : tuple of str
+        Observation sources of the configuration that the bag has no topic for; without those the user wants none for.
     faults : tuple of str
         What went wrong in the server: scans that a map did not take, layers that raised.
     plan : mapping, optional
@@ -60,6 +62,7 @@ class Replayed:
     topics: Mapping[str, TopicStatistics]
     frames: Mapping[str, FrameStatistics]
     poses_unknown: int
+    sources_without_topic: tuple[str, ...]
     faults: tuple[str, ...]
     plan: Mapping[str, Any] | None
 
@@ -88,7 +91,8 @@ def replay_bag(
         for transform in options.transforms:
             transforms.set(transform)
         maps = RobotInputs(session.clock.now, lambda: MessageContext(config.parameters.global_frame)).of_maps(server)
-        topics = choose_topics(bag.types, options.topics, *_sources(server), maps)
+        sources, takes_any = _sources(server)
+        topics = choose_topics(bag.types, options.topics, sources, takes_any, maps)
         check_transforms(bag, topics, options.transforms, options.odometry_as_transform)
         time = RecordedTime(bag, topics, config.parameters.global_frame)
         inputs = BagInputs(bag, topics, time, server, robot, options.odometry_as_transform)
@@ -97,7 +101,9 @@ def replay_bag(
         with server.using_map(PluginKind.PLANNER):
             player = _Player(session, server, time, observation, options, on_progress)
             plan = player.play(bag, inputs)
-        return _replayed(bag, session.memory.events, time, inputs, observation, plan)
+        found = {source for _, source in topics.sensors.values()}
+        missing = tuple(one for one in sources if one not in found and one not in options.topics)
+        return _replayed(bag, session.memory.events, time, inputs, observation, plan, missing)
 
 
 class _Player:
@@ -188,6 +194,7 @@ def _replayed(
     inputs: BagInputs,
     observation: Observation,
     plan: ReplayedPlan | None,
+    missing: tuple[str, ...],
 ) -> Replayed:
     kept = [replace(event, time=round(event.time - time.began, 9)) for event in events if event.time >= time.began]
     faults = [
@@ -211,6 +218,7 @@ def _replayed(
         inputs.topics,
         inputs.frames,
         observation.poses_unknown,
+        missing,
         tuple(faults),
         as_json,
     )

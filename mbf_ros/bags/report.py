@@ -23,6 +23,7 @@ def statistics_of(replayed: Replayed) -> dict[str, Any]:
         "frames": {frame: replayed.frames[frame].to_json() for frame in sorted(replayed.frames)},
         "samples": len(replayed.log.times),
         "samples_without_pose": replayed.poses_unknown,
+        "sources_without_topic": list(replayed.sources_without_topic),
         "faults": list(replayed.faults),
     }
 
@@ -55,7 +56,16 @@ def result_line(replayed: Replayed) -> str:
     return f"{line}; plan at {plan['at_s']:.1f} s: {plan['outcome_name']}{shown}: {plan['message']}"
 
 
+def missing_notes(replayed: Replayed) -> list[str]:
+    """One note for each source of the configuration that is not in the bag."""
+    return [
+        f"The bag has no topic for the source {source!r}: nothing of it is in the maps."
+        for source in replayed.sources_without_topic
+    ]
+
+
 def _notes(replayed: Replayed) -> Iterator[str]:
+    yield from missing_notes(replayed)
     if replayed.stamp_shift:
         yield (
             f"Stamps are of another clock than that of the recording; they were moved by {replayed.stamp_shift:.3f} s."

@@ -30,6 +30,12 @@ def test_a_file_that_is_no_bag_is_named(tmp_path, name):
     assert str(tmp_path / name) in refusal(tmp_path / name)
 
 
+def test_metadata_that_are_no_yaml_are_named_in_one_line(tmp_path):
+    (tmp_path / "metadata.yaml").write_text("a: [b\n")
+    text = refusal(tmp_path)
+    assert "metadata.yaml: while parsing a flow sequence" in text and "\n" not in text
+
+
 def test_what_is_not_there_is_named(tmp_path):
     assert "no such file" in refusal(tmp_path / "nothing.bag")
     assert "metadata.yaml" in refusal(tmp_path)

@@ -13,7 +13,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry.transform import Transform
 from mbf_ros.bags.reading import open_bag
 from mbf_ros.bags.recorded_time import RecordedTime
-from mbf_ros.bags.report import report_of, result_line, statistics_of
+from mbf_ros.bags.report import missing_notes, report_of, result_line, statistics_of
 from mbf_ros.bags.topics import choose_topics
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.sensors import point_cloud
@@ -51,6 +51,18 @@ def test_scans_of_every_kind_of_bag_mark_the_wall_where_it_stood(tmp_path, repla
     assert result.topics["/base_scan"].used_as == "lidar" and not result.topics["/base_scan"].dropped
     assert result.log.poses[-1, 0] == pytest.approx(2.0 * SPEED, abs=0.06)
     assert result.log.twists[-1, 0] == SPEED and result.duration == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("scans", "topics", "missing"), [(True, {}, []), (False, {}, ["lidar"]), (False, {"lidar": ""}, [])]
+)
+def test_a_source_without_a_topic_is_noted_unless_it_is_left_out(replayed, scans, topics, missing):
+    result = replayed([one for one in drive(0.5) if scans or one.topic != "/base_scan"], topics=topics)
+
+    notes = [f"The bag has no topic for the source {name!r}: nothing of it is in the maps." for name in missing]
+    assert missing_notes(result) == notes
+    assert statistics_of(result)["sources_without_topic"] == missing
+    assert [text for text in report_of(result).notes if "source" in text] == notes
 
 
 def test_a_scan_is_placed_by_the_transform_of_its_own_stamp(replayed):
