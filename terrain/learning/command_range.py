@@ -41,9 +41,12 @@ class CommandRange(ParameterModel):
         ValueError
             The action has another shape, or is not finite.
         """
-        values = np.asarray(action, dtype=np.float64)
+        try:
+            values = np.asarray(action, dtype=np.float64)
+        except (TypeError, ValueError):
+            values = np.full(0, np.nan)
         if values.shape != (self.size,) or not np.isfinite(values).all():
-            raise ValueError(f"action: expected {self.size} finite numbers from -1 to 1, got {values.tolist()}")
+            raise ValueError(f"action: expected {self.size} finite numbers from -1 to 1, got {action!r}")
         ahead, turn, *left = np.clip(values, -1.0, 1.0).tolist()
         speed = ahead * (self.max_vel_x if ahead > 0.0 else -self.min_vel_x)
         return Twist.planar(speed, left[0] * self.max_vel_y if left else 0.0, turn * self.max_vel_theta)

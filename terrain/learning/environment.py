@@ -21,7 +21,10 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
+from mbf_abstract.config.findings import format_key_path
+from mbf_abstract.config.mistakes import mistakes_of
 from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.parameters import ParameterModel
 from terrain.experiments.evaluation import indoor, moving, outdoor
@@ -91,7 +94,7 @@ class NavigationEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.float32]]):
             raise ValueError(f"control_period: expected a time above 0 s, got {control_period}")
         if time_limit is not None and not time_limit > 0.0:
             raise ValueError(f"time_limit: expected a time above 0 s, got {time_limit}")
-        if not 0 <= seeds[0] < seeds[1]:
+        if not (isinstance(seeds, tuple | list) and len(seeds) == 2 and 0 <= seeds[0] < seeds[1]):
             raise ValueError(f"seeds: expected a first one from 0 on, and a later one, got {seeds}")
         self.render_mode = render_mode
         self._worlds = worlds if callable(worlds) else one_world(worlds)
@@ -203,4 +206,11 @@ def of_bench_moving(
 
 
 def _model(model: type[Model], values: Model | Values) -> Model:
-    return values if isinstance(values, model) else model.model_validate(dict(values))
+    """Parameters of a dictionary; raises ValueError with a line for each that is wrong."""
+    try:
+        return values if isinstance(values, model) else model.model_validate(dict(values))
+    except ValidationError as error:
+        wrong = mistakes_of(model, dict(values), error.errors(include_url=False))
+        known = ", ".join(model.model_fields)
+        lines = [f"{format_key_path(one.loc)}: expected {one.expected}, got {one.got}" for one in wrong]
+        raise ValueError("\n".join([*lines, f"known: {known}"])) from error

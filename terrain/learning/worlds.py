@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from mbf_abstract.config.findings import ConfigError, Finding
 from terrain.experiments.evaluation import indoor, moving, outdoor
 from terrain.scenarios.scenario import Scenario, load_scenario
@@ -68,5 +70,5 @@ def bench_moving(levels: Sequence[int] = range(moving.LEVELS), people: str = mov
 
 
 def _check(levels: Sequence[int], count: int) -> None:
-    if not levels or not all(0 <= level < count for level in levels):
+    if not levels or not all(isinstance(level, int | np.integer) and 0 <= level < count for level in levels):
         raise ValueError(f"levels: expected at least one from 0 to {count - 1}, got {list(levels)}")

@@ -152,8 +152,9 @@ def test_every_shipped_scenario_with_one_robot_has_an_id():
         ({"time_limit": 0.0}, "time_limit: expected a time above 0 s, got 0.0"),
         ({"time_limit": float("nan")}, "time_limit: expected a time above 0 s, got nan"),
         ({"seeds": (5, 5)}, "seeds: expected a first one from 0 on, and a later one"),
-        ({"observation": {"scan_sector": 3}}, "scan_sector"),
-        ({"commands": {"max_vel_x": -1.0}}, "max_vel_x"),
+        ({"seeds": 5}, "seeds: expected a first one from 0 on, and a later one, got 5"),
+        ({"observation": {"scan_sector": 3}}, "^scan_sector: expected a known key, got 'scan_sector'"),
+        ({"commands": {"max_vel_x": -1.0}}, "^max_vel_x: expected a number > 0 and <= 20 m/s, got -1.0"),
     ],
 )
 def test_a_wrong_argument_is_refused_at_once(make_environment, arguments, message):
@@ -262,7 +263,7 @@ def test_a_simulation_that_fails_ends_the_episode(make_environment):
     environment.reset(seed=0)
 
 
-@pytest.mark.parametrize("levels", [[], [12], [-1]])
+@pytest.mark.parametrize("levels", [[], [12], [-1], ["a"], [2.5]])
 def test_levels_that_an_evaluation_does_not_have_are_refused(levels):
     for worlds in (bench_indoor, bench_outdoor):
         with pytest.raises(ValueError, match="levels: expected at least one from 0 to 9"):

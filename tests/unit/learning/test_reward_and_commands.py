@@ -34,7 +34,7 @@ def test_the_range_of_a_robot_is_what_it_can_do():
     assert CommandRange.of(CAR).size == 2
 
 
-@pytest.mark.parametrize("action", [[0.0], [0.0, np.inf], [[0.0, 0.0]]])
+@pytest.mark.parametrize("action", [[0.0], [0.0, np.inf], [[0.0, 0.0]], "x", None, [0.0, "left"]])
 def test_an_action_of_another_shape_or_that_is_not_finite_is_refused(action):
     with pytest.raises(ValueError, match="action: expected 2 finite numbers from -1 to 1"):
         RANGE.command(action)
