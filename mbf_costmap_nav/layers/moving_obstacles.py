@@ -95,15 +95,16 @@ class MovingObstaclesLayer(TrackingLayer, GridLayer):
         window[self._trail[box.slices] & (window == LETHAL)] = FREE
         combine(cells, self.cells, box, CombinationMethod.MAXIMUM_WITHOUT_UNKNOWN_OVERWRITE)
 
-    def _obstacle_points(self, scan: RangeScan) -> FloatArray:
-        """The points of a scan that no floor plan explains, at height 0; none while that cannot be known."""
-        limits = self.parameters
-        ends = scan.between_heights(limits.min_obstacle_height, limits.max_obstacle_height).ends
+    def _obstacle_points(self, scan: RangeScan) -> tuple[FloatArray, NDArray[np.int64]]:
+        """The points of a scan that no floor plan explains, at height 0, and their rays; none while that is unknown."""
+        limits, heights = self.parameters, scan.ends[:, 2]
+        rays = np.flatnonzero((heights >= limits.min_obstacle_height) & (heights <= limits.max_obstacle_height))
         try:
-            explained = self._static_maps.explain(ends, self._frame_id, limits.static_distance)
+            explained = self._static_maps.explain(scan.ends[rays], self._frame_id, limits.static_distance)
         except TransformError:
-            return np.zeros((0, 3))
-        return np.asarray(ends[~explained] * (1.0, 1.0, 0.0))
+            explained = np.ones(len(rays), dtype=np.bool_)
+        rays = rays[~explained]
+        return np.asarray(scan.ends[rays] * (1.0, 1.0, 0.0)), rays
 
     def _note_trail(self, seen: Sighting) -> CellBox:
         """Add what moving objects have left to the trail, take out what is seen now; return the box that changes."""

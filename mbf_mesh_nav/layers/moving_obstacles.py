@@ -158,14 +158,14 @@ class MovingObstaclesLayer(TrackingLayer, MeshLayer):
         self._costs[changed], self._lethal[changed] = costs[differs], lethal[differs]
         return changed
 
-    def _obstacle_points(self, scan: RangeScan) -> FloatArray:
-        """Places (n, 3) [m] on the surface below the points of a scan that the mesh does not explain."""
+    def _obstacle_points(self, scan: RangeScan) -> tuple[FloatArray, NDArray[np.int64]]:
+        """Places (n, 3) [m] on the surface below the points that the mesh does not explain, and the rays of these."""
         p = self.parameters
-        off = scan.ends[self.locator.locate(scan.ends, p.static_distance).faces < 0]
-        faces, heights = self.locator.cast_rays(off, DOWN, p.robot_height)
+        off = np.flatnonzero(self.locator.locate(scan.ends, p.static_distance).faces < 0)
+        faces, heights = self.locator.cast_rays(scan.ends[off], DOWN, p.robot_height)
         stands = faces >= 0
-        self._faces = faces[stands]
-        return np.asarray(off[stands] + heights[stands, None] * DOWN)
+        rays, self._faces = off[stands], faces[stands]
+        return np.asarray(scan.ends[rays] + heights[stands, None] * DOWN), rays
 
     def _note_trail(self, of_moving: NDArray[np.bool_]) -> IntArray:
         """Add what moving objects have left to the trail, take out what is seen now; return what may change."""

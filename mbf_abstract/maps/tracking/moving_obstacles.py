@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,13 +23,14 @@ from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.maps.tracking.prediction import NOWHERE, Prediction, PredictionParameters, predict
+from mbf_abstract.maps.tracking.rays import Rays
 from mbf_abstract.maps.tracking.tracker import Tracker, TrackingParameters
 from mbf_abstract.parameters import parameter
 
 MAX_WAITING = 64
 """Scans that may wait for an update; older ones are dropped."""
-ObstaclePoints = Callable[[RangeScan], FloatArray]
-"""The points (n, 3) [m] of a scan that may be objects, on the ground below them."""
+ObstaclePoints = Callable[[RangeScan], tuple[FloatArray, NDArray[np.int64]]]
+"""The points (n, 3) [m] of a scan that may be objects, on the ground below them, and the ray (n,) that hit each."""
 
 
 class MovingObstaclesParameters(TrackingParameters, PredictionParameters):
@@ -99,9 +101,11 @@ class MovingObstacles:
             self._tracker.parameters = parameters
         while self._waiting:
             scan = self._waiting.popleft()
-            points = obstacle_points(_within(scan, parameters))
+            near = _near_hits(scan, parameters)
+            points, of_near = obstacle_points(replace(scan, ends=scan.ends[near], hits=scan.hits[near]))
+            rays = Rays(scan.ends, near[of_near])
             with self._lock:
-                numbers = self._tracker.insert(points, scan.origin, scan.stamp)
+                numbers = self._tracker.insert(points, scan.origin, scan.stamp, rays)
                 of_moving = self._tracker.are_moving(numbers)
             self._watches[scan.source].used()
             self._sensor = scan.origin
@@ -179,8 +183,8 @@ class TrackingLayer(MapLayer):
         return self._objects.guarded_objects(now)
 
 
-def _within(scan: RangeScan, limits: MovingObstaclesParameters) -> RangeScan:
-    """The hits of a scan whose distances are within the limits."""
+def _near_hits(scan: RangeScan, limits: MovingObstaclesParameters) -> NDArray[np.int64]:
+    """Which rays (n,) of a scan hit something at a distance within the limits."""
     distances = norm(scan.ends - scan.origin) if len(scan.ends) else np.zeros(0)
     near = scan.hits & (distances > limits.obstacle_min_range) & (distances <= limits.obstacle_max_range)
-    return RangeScan(scan.source, scan.frame_id, scan.origin, scan.ends[near], scan.hits[near], scan.stamp)
+    return np.flatnonzero(near)

@@ -2,7 +2,8 @@
 
 Clusters of points are assigned to the objects that are known, the nearest pairs first, and correct a Kalman filter of
 constant velocity for each. One that is off its expected place to the same side twice has turned: its filter learns the
-new velocity at once. What is seen for the first time begins an object, what is not seen any more is forgotten.
+new velocity at once. What is seen for the first time begins an object, what is not seen any more is forgotten. Where
+the rays of a scan are known, motion is seen in the sides of a cluster that nothing hides.
 
 When to use: people and robots among walls that a static map knows; take the points of that map out first, or what is
 seen of a wall through a gap passes for something that moves. When not: crowds so dense that their clusters merge, and
@@ -21,7 +22,9 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.maps.tracking.kernels import filtering as states_of
 from mbf_abstract.maps.tracking.kernels.clustering import bounding_boxes, cluster
+from mbf_abstract.maps.tracking.kernels.occlusion import find_free_sides
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
+from mbf_abstract.maps.tracking.rays import Rays
 from mbf_abstract.parameters import ParameterModel, parameter
 
 MAX_POINTS = 2000
@@ -93,7 +96,9 @@ class Tracker:
         """Return how many objects are followed, those that are not confirmed yet included."""
         return self._count
 
-    def insert(self, points: FloatArray, sensor: FloatArray, stamp: float) -> NDArray[np.int64]:
+    def insert(
+        self, points: FloatArray, sensor: FloatArray, stamp: float, rays: Rays | None = None
+    ) -> NDArray[np.int64]:
         """Take in the points of one scan.
 
         Parameters
@@ -104,6 +109,8 @@ class Tracker:
             Where it was seen from [m].
         stamp : float
             When [s]; a scan older than the last one is ignored.
+        rays : Rays, optional
+            All of the scan; without them each cluster is taken to be seen from end to end.
 
         Returns
         -------
@@ -118,6 +125,9 @@ class Tracker:
         seen = np.ascontiguousarray(points[::stride], dtype=np.float64)
         labels, count = cluster(seen, np.argsort(seen[:, 0], kind="stable"), p.cluster_distance)
         boxes = bounding_boxes(seen, labels, count)
+        if rays is not None:
+            ends, of_points = rays.thinned(stride)
+            find_free_sides(ends[of_points], labels, boxes, ends, sensor, p.max_size)
         seconds = self._advance(stamp)
         states = self._room[: self._count]
         owners = states_of.assign(states, boxes, sensor, p.max_size, p.association_distance)

@@ -21,7 +21,7 @@ def seen_at(x, stamp):
 def take_in(tracked, *scans):
     for one in scans:
         tracked.insert_scan(one)
-    return list(tracked.take_in(PARAMETERS, lambda scan: scan.ends))
+    return list(tracked.take_in(PARAMETERS, lambda scan: (scan.ends, np.arange(len(scan.ends)))))
 
 
 def walker():

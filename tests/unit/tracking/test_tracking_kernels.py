@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.maps.tracking.kernels import filtering
-from mbf_abstract.maps.tracking.kernels.clustering import bounding_boxes, cluster
+from mbf_abstract.maps.tracking.kernels.clustering import BOX_COLUMNS, NEITHER, bounding_boxes, cluster
 
 SENSOR = np.array([0.0, 0.0, 0.3])
 coordinates = st.floats(-2.0, 2.0).map(lambda value: round(value, 2))
@@ -46,7 +46,7 @@ def test_boxes_hold_their_points(cloud):
     for number, box in enumerate(bounding_boxes(points, labels, count).tolist()):
         own = points[labels == number]
         sides = [own[:, 0].min(), own[:, 0].max(), own[:, 1].min(), own[:, 1].max()]
-        assert box == pytest.approx([*sides, own[:, 2].mean(), len(own)])
+        assert box == pytest.approx([*sides, own[:, 2].mean(), len(own), NEITHER, NEITHER])
 
 
 def naive_owners(middles, places, distance):
@@ -67,7 +67,8 @@ grid_places = st.lists(st.tuples(st.integers(-4, 4), st.integers(-4, 4)), max_si
 def test_the_nearest_pairs_are_assigned_first_and_ties_to_the_lower_numbers(middles, places):
     states = np.zeros((len(middles), filtering.STATE_COLUMNS))
     states[:, [filtering.X, filtering.Y]] = np.array(middles, dtype=float).reshape(-1, 2)
-    boxes = np.array([[x, x, y, y, 0.0, 5.0] for x, y in places], dtype=float).reshape(-1, 6)
+    boxes = np.array([[x, x, y, y, 0.0, 5.0, NEITHER, NEITHER] for x, y in places], dtype=float)
+    boxes = boxes.reshape(-1, BOX_COLUMNS)
     owners = filtering.assign(states, boxes, np.array([0.0, 0.0, 0.0]), 1.5, 3.0)
     assert owners.tolist() == naive_owners(middles, places, 3.0)
 
@@ -86,14 +87,14 @@ def test_the_filter_is_that_of_the_textbook(steps, position_deviation, accelerat
     """
     deviations = np.array([position_deviation, 0.6])
     states, stamp = np.zeros((1, filtering.STATE_COLUMNS)), 0.0
-    first = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 5.0])
+    first = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 5.0, NEITHER, NEITHER])
     filtering.born(first, SENSOR, stamp, states[0], deviations)
     mean, covariance, before = np.array([0.0, 0.0]), np.diag(deviations**2), 0.0
     weights = np.array([position_deviation, turning_deviation])
     for seconds, measured in steps:
         stamp += seconds
         filtering.predict(states, seconds, acceleration_deviation)
-        box = np.array([[measured, measured, 1.0, 1.0, 0.0, 5.0]])
+        box = np.array([[measured, measured, 1.0, 1.0, 0.0, 5.0, NEITHER, NEITHER]])
         filtering.correct(states, box, np.array([0]), SENSOR, stamp, seconds, weights, 0.0)
         model = np.array([[1.0, seconds], [0.0, 1.0]])
         push = np.array([0.5 * seconds**2, seconds]) * acceleration_deviation

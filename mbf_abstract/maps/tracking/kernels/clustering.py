@@ -10,9 +10,12 @@ from mbf_abstract.compiling.decorators import kernel
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
-BOX_COLUMNS = 6
-LEAST_X, GREATEST_X, LEAST_Y, GREATEST_Y, MEAN_Z, POINTS = range(BOX_COLUMNS)
-"""Columns of a box: its sides [m], the mean height [m] of its points, and how many there are."""
+BOX_COLUMNS = 8
+LEAST_X, GREATEST_X, LEAST_Y, GREATEST_Y, MEAN_Z, POINTS, FREE_X, FREE_Y = range(BOX_COLUMNS)
+"""Columns of a box: its sides [m], the mean height [m] of its points, how many there are, and which side along x and
+along y is free where the other one is occluded."""
+LEAST, NEITHER, GREATEST = -1.0, 0.0, 1.0
+"""Which of two sides alone is free; ``NEITHER`` also where both are."""
 
 
 @kernel
@@ -71,12 +74,13 @@ def cluster(points: FloatArray, order: Labels, distance: float) -> tuple[Labels,
 
 @kernel
 def bounding_boxes(points: FloatArray, labels: Labels, count: int) -> FloatArray:
-    """(count, BOX_COLUMNS) float64, the box of each cluster of ``points`` (n, 3) [m]."""
+    """(count, BOX_COLUMNS) float64, the box of each cluster of ``points`` (n, 3) [m]; no side is occluded yet."""
     boxes = np.empty((count, BOX_COLUMNS), dtype=np.float64)
     for i in range(count):
         boxes[i, LEAST_X] = boxes[i, LEAST_Y] = np.inf
         boxes[i, GREATEST_X] = boxes[i, GREATEST_Y] = -np.inf
         boxes[i, MEAN_Z] = boxes[i, POINTS] = 0.0
+        boxes[i, FREE_X] = boxes[i, FREE_Y] = NEITHER
     for i in range(len(points)):
         box, x, y = boxes[labels[i]], points[i, 0], points[i, 1]
         box[LEAST_X], box[GREATEST_X] = min(box[LEAST_X], x), max(box[GREATEST_X], x)

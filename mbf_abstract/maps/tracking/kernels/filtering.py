@@ -3,9 +3,6 @@
 The state of an object along x and along y is position and velocity; both axes share one covariance, as noise is the
 same in all directions. The model is constant velocity with white noise of acceleration (Bar-Shalom, Li, Kirubarajan
 2001, section 6.3.2); the arithmetic is written out, so it is the same on every CPU.
-
-A scan shows only the near side of an object. So its size is remembered, and its middle is measured from the side that
-faces the sensor: the middle stays where it is while more or less of the far side comes into view.
 """
 
 from __future__ import annotations
@@ -15,6 +12,8 @@ from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import kernel
 from mbf_abstract.maps.tracking.kernels.clustering import (
+    FREE_X,
+    FREE_Y,
     GREATEST_X,
     GREATEST_Y,
     LEAST_X,
@@ -22,17 +21,19 @@ from mbf_abstract.maps.tracking.kernels.clustering import (
     MEAN_Z,
     POINTS,
 )
+from mbf_abstract.maps.tracking.kernels.measuring import measure, middle_of
 
 FloatArray = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-STATE_COLUMNS = 23
+STATE_COLUMNS = 25
 X, Y, Z, VX, VY, VAR_POSITION, COVARIANCE, VAR_VELOCITY, HALF_X, HALF_Y = range(10)
 FIRST_SEEN, LAST_SEEN, SCANS, ANCHOR_X, ANCHOR_Y, ANCHOR_TIME, HAS_MOVED, CLEARED, OFF_X, OFF_Y = range(10, 20)
-PACE, COURSE_X, COURSE_Y = range(20, STATE_COLUMNS)
+PACE, COURSE_X, COURSE_Y, FROM_X, FROM_Y = range(20, STATE_COLUMNS)
 """Columns of the state of an object. It stood at its anchor at ``ANCHOR_TIME`` [s], and came there by ``COURSE`` [m];
 ``HAS_MOVED`` is 0 or 1, and so is ``CLEARED``: whether it was cleared and not seen since. In its last scan it was
-``OFF`` [m] away from where it was expected. ``PACE`` [m/s] is its greatest speed of late."""
+``OFF`` [m] away from where it was expected. ``PACE`` [m/s] is its greatest speed of late. Its middle was measured
+``FROM`` the only free side of its box, if there was one."""
 NOBODY = -1
 TURNED = 0.5
 """An object has turned if it is off to the same side in two scans, by this many standard deviations: the geometric mean
@@ -55,16 +56,6 @@ def predict(states: FloatArray, seconds: float, acceleration_deviation: float) -
         state[COVARIANCE] += seconds * state[VAR_VELOCITY] + 0.5 * q * square * seconds
         state[VAR_VELOCITY] += q * square
         state[PACE] = max(state[PACE] - acceleration_deviation * seconds, 0.0)
-
-
-@kernel
-def middle_of(least: float, greatest: float, half: float, sensor: float) -> float:
-    """Middle [m] along one axis of a thing of half size ``half`` seen from ``least`` to ``greatest`` by a sensor."""
-    if sensor < least:
-        return least + half
-    if sensor > greatest:
-        return greatest - half
-    return 0.5 * (least + greatest)
 
 
 @kernel
@@ -98,8 +89,8 @@ def assign(states: FloatArray, boxes: FloatArray, sensor: FloatArray, max_size: 
             if max(width, depth) > max_size:
                 squares[i, j] = np.inf
                 continue
-            x = middle_of(box[LEAST_X], box[GREATEST_X], max(states[i, HALF_X], 0.5 * width), sensor[0])
-            y = middle_of(box[LEAST_Y], box[GREATEST_Y], max(states[i, HALF_Y], 0.5 * depth), sensor[1])
+            x = middle_of(box[LEAST_X], box[GREATEST_X], max(states[i, HALF_X], 0.5 * width), sensor[0], box[FREE_X])
+            y = middle_of(box[LEAST_Y], box[GREATEST_Y], max(states[i, HALF_Y], 0.5 * depth), sensor[1], box[FREE_Y])
             dx, dy, dz = x - states[i, X], y - states[i, Y], box[MEAN_Z] - states[i, Z]
             squares[i, j] = dx * dx + dy * dy + dz * dz
     owners = np.empty(m, dtype=np.int64)
@@ -151,10 +142,9 @@ def correct(
         if owners[j] == NOBODY:
             continue
         state, box = states[owners[j]], boxes[j]
-        _take_size(state, X, HALF_X, ANCHOR_X, box[LEAST_X], box[GREATEST_X], sensor[0], shrink)
-        _take_size(state, Y, HALF_Y, ANCHOR_Y, box[LEAST_Y], box[GREATEST_Y], sensor[1], shrink)
-        dx = middle_of(box[LEAST_X], box[GREATEST_X], state[HALF_X], sensor[0]) - state[X]
-        dy = middle_of(box[LEAST_Y], box[GREATEST_Y], state[HALF_Y], sensor[1]) - state[Y]
+        columns_x, columns_y = (X, HALF_X, ANCHOR_X, FROM_X), (Y, HALF_Y, ANCHOR_Y, FROM_Y)
+        dx = measure(state, columns_x, box[LEAST_X], box[GREATEST_X], sensor[0], box[FREE_X], shrink)
+        dy = measure(state, columns_y, box[LEAST_Y], box[GREATEST_Y], sensor[1], box[FREE_Y], shrink)
         _notice_turn(state, dx, dy, noise, seconds, deviations[1])
         total = state[VAR_POSITION] + noise
         gain, velocity_gain = state[VAR_POSITION] / total, state[COVARIANCE] / total
@@ -191,25 +181,6 @@ def _notice_turn(
 
 
 @kernel
-def _take_size(
-    state: FloatArray,
-    position: int,
-    size: int,
-    anchor: int,
-    least: float,
-    greatest: float,
-    sensor: float,
-    shrink: float,
-) -> None:
-    """Remember the half size along one axis; the middle that moves with it is no motion."""
-    half = max(0.5 * (greatest - least), state[size] - shrink)
-    moved = middle_of(least, greatest, half, sensor) - middle_of(least, greatest, state[size], sensor)
-    state[size] = half
-    state[position] += moved
-    state[anchor] += moved
-
-
-@kernel
 def note_motion(states: FloatArray, stamp: float, distance: float) -> None:
     """Move the anchors of ``states`` that are farther than ``distance`` [m] from them at ``stamp`` [s]."""
     for i in range(len(states)):
@@ -227,8 +198,9 @@ def born(box: FloatArray, sensor: FloatArray, stamp: float, state: FloatArray, d
     for column in range(STATE_COLUMNS):
         state[column] = 0.0
     state[HALF_X], state[HALF_Y] = half_x, half_y
-    state[X] = state[ANCHOR_X] = middle_of(box[LEAST_X], box[GREATEST_X], half_x, sensor[0])
-    state[Y] = state[ANCHOR_Y] = middle_of(box[LEAST_Y], box[GREATEST_Y], half_y, sensor[1])
+    state[X] = state[ANCHOR_X] = middle_of(box[LEAST_X], box[GREATEST_X], half_x, sensor[0], box[FREE_X])
+    state[Y] = state[ANCHOR_Y] = middle_of(box[LEAST_Y], box[GREATEST_Y], half_y, sensor[1], box[FREE_Y])
+    state[FROM_X], state[FROM_Y] = box[FREE_X], box[FREE_Y]
     state[Z] = box[MEAN_Z]
     state[VAR_POSITION], state[VAR_VELOCITY] = deviations[0] * deviations[0], deviations[1] * deviations[1]
     state[FIRST_SEEN] = state[LAST_SEEN] = state[ANCHOR_TIME] = stamp
