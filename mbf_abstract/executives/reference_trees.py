@@ -29,6 +29,7 @@ from mbf_abstract.executives.pacing import Delay, InBackground
 from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
 from mbf_abstract.executives.trees.by_motion import MARGIN, EndDrive, PickByMotion, first_in_the_way
 from mbf_abstract.executives.trees.giving_way import give_way
+from mbf_abstract.executives.trees.long_way import IsLongWay, ShorterPath
 from mbf_abstract.executives.trees.options import TreeOptions
 from mbf_abstract.executives.trees.overtaking import IsHeldUp, Overtake
 from mbf_abstract.executives.watchdogs import MotorWatchdog, OscillationWatchdog, ProgressWatchdog
@@ -124,7 +125,9 @@ def _second_planner(options: TreeOptions) -> Behaviour:
     by_motion = PickByMotion("who blocks it?", for_standing, nobody=around, standing=STANDING)
     past = Overtake("path past it", planner, SECOND_PLANNER_SLOT, options.longest_update, options.refiner)
     overtake = Sequence("overtake", memory=True, children=[IsHeldUp(), past])
-    nodes = [_if_blocked(options, by_motion), overtake, _beside(options, planner)]
+    shorter = ShorterPath("shorter path", planner, SECOND_PLANNER_SLOT, refiner=options.refiner, once=True)
+    back = Sequence("back to the short way", memory=True, children=[IsLongWay(), shorter])
+    nodes = [_if_blocked(options, by_motion), overtake, _beside(options, planner), back]
     return Selector("update", memory=True, children=nodes)
 
 
