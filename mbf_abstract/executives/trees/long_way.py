@@ -1,4 +1,4 @@
-"""A long way around somebody who moved as it was planned: ``IsLongWay`` and ``ShorterPath``, beside a drive.
+"""A long detour around somebody who moved as it was planned: ``IsLongWay`` and ``ShorterPath``, beside a drive.
 
 When to use: where a plan takes those who move to stay where they are, and where they will be soon. Somebody in an aisle
 blocks it, and a plan that is made just then leads around the whole block. Once they have gone the short way is free
@@ -18,7 +18,7 @@ from mbf_abstract.goals.result_types import GetPathResult
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 
 LONG = 2.0
-"""A path of more than so many times the straight distance, and ``SHORT_DETOUR``, may be a long way around."""
+"""A path of more than so many times the straight distance, and ``SHORT_DETOUR``, may be a long detour."""
 MOST = 3
 """So often a shorter path is asked for on the way to one target."""
 
@@ -26,7 +26,7 @@ MOST = 3
 class IsLongWay(Leaf):
     """Succeed where the path is a long way, and all have gone who moved when it was planned, or asked for again."""
 
-    def __init__(self, name: str = "long way around somebody who has gone?") -> None:
+    def __init__(self, name: str = "long detour around somebody who has gone?") -> None:
         super().__init__(name)
         self._target: Pose | None = None
         self._plan: GetPathResult | None = None
