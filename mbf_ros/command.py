@@ -44,7 +44,7 @@ def serve(
         ..., metavar="CONFIG|SCENARIO", help="A navigation file, whose robot is a client; or a scenario, simulated."
     ),
     backend: str = typer.Option("", "--backend", help="Map backend of a scenario; its own if not given."),
-    seed: int = typer.Option(-1, "--seed", min=-1, help="Seed of a scenario; its own if not given."),
+    seed: int | None = typer.Option(None, "--seed", min=0, help="Seed of a scenario; its own if not given."),
     host: str = typer.Option("127.0.0.1", "--host", help="Interface; others than loopback are not encrypted."),
     port: int = typer.Option(9090, "--port", min=0, max=65535, help="Port; 0 takes a free one."),
     token: bool = typer.Option(
@@ -94,7 +94,7 @@ def serve(
         if robot_only and _is_navigation(Path(what)):
             raise ValueError("--robot-only is for scenarios: the robot of a navigation file is a client itself")
         with waiting("reading the configuration") as on_step:
-            session, robot = _open(what, backend or None, seed if seed >= 0 else None, max_silence, on_step)
+            session, robot = _open(what, backend or None, seed, max_silence, on_step)
         served = serve_robot(session, options) if robot_only else serve_session(session, options, robot)
         with session, served as server:
             _report(server, options, robot is not None)

@@ -51,8 +51,8 @@ def run(
         help="Map backend: mesh or costmap; the scenario's own if not given.",
         autocompletion=complete_backend,
     ),
-    seed: int = typer.Option(
-        -1, "--seed", min=-1, help="Seed of sensors and plugins; the scenario's own if not given."
+    seed: int | None = typer.Option(
+        None, "--seed", min=0, help="Seed of sensors and plugins; the scenario's own if not given."
     ),
     out: Path | None = typer.Option(None, "--out", help="Folder for the results; runs/<time> if not given."),
     map_file: Path | None = typer.Option(None, "--map", help="Drive in the building of this map_server yaml instead."),
@@ -115,6 +115,8 @@ def run(
         refuse_without(context, "--ros2", "ros2_stamped", "ros2_lockstep", "ros2_patience")
     if not view:
         refuse_without(context, "--view", "view_port", "view_host", "view_token", "view_read_only")
+    if not (view or foxglove):
+        refuse_without(context, "--view or --foxglove", "view_speed", "stay")
     folder = out or new_run_folder(RUNS, datetime.now())
     with readable_errors(folder):
         from terrain.commands.live_line import LiveLine
@@ -127,7 +129,7 @@ def run(
                 folder=folder,
                 command=command_line(context),
                 backend=backend or None,
-                seed=seed if seed >= 0 else None,
+                seed=seed,
                 wall_clock=wall_clock,
                 settings=chosen,
                 on_progress=live.progress,

@@ -1,4 +1,4 @@
-"""Options of ``mbf run`` for a page or an app that are of no use: one error each, before anything is driven."""
+"""Options of ``mbf run`` that are of no use, as those for a page without one: one error each before anything drives."""
 
 import pytest
 from typer.testing import CliRunner
@@ -12,6 +12,9 @@ from mbf_abstract.cli import make_app
         (["--view-read-only"], "Invalid value for --view-read-only: it goes with --view only"),
         (["--view-host", "0.0.0.0"], "Invalid value for --view-host: it goes with --view only"),
         (["--foxglove", "--view-port", "8081"], "Invalid value for --view-port: it goes with --view only"),
+        (["--view-speed", "2"], "Invalid value for --view-speed: it goes with --view or --foxglove only"),
+        (["--no-stay"], "it goes with --view or --foxglove only"),
+        (["--seed", "-1"], "Invalid value for '--seed': Input should be greater than or equal to 0"),
         (["--foxglove", "--foxglove-origin", "app.example"], "such as http://localhost:8080, got 'app.example'"),
         (["--foxglove", "--foxglove-origin", "http://app.example/"], "got 'http://app.example/'"),
     ],
