@@ -52,7 +52,7 @@ def run(
         autocompletion=complete_backend,
     ),
     seed: int | None = typer.Option(
-        None, "--seed", min=0, help="Seed of sensors and plugins; the scenario's own if not given."
+        None, "--seed", min=0, help="Seed of sensors and plugins; else the scenario's own."
     ),
     out: Path | None = typer.Option(None, "--out", help="Folder for the results; runs/<time> if not given."),
     map_file: Path | None = typer.Option(None, "--map", help="Drive in the building of this map_server yaml instead."),
