@@ -51,9 +51,7 @@ def run(
         help="Map backend: mesh or costmap; the scenario's own if not given.",
         autocompletion=complete_backend,
     ),
-    seed: int | None = typer.Option(
-        None, "--seed", min=0, help="Seed of sensors and plugins; else the scenario's own."
-    ),
+    seed: int | None = typer.Option(None, "--seed", min=0, help="Seed of sensors and plugins; else the scenario's."),
     out: Path | None = typer.Option(None, "--out", help="Folder for the results; runs/<time> if not given."),
     map_file: Path | None = typer.Option(None, "--map", help="Drive in the building of this map_server yaml instead."),
     planner: str = typer.Option(
