@@ -4,11 +4,11 @@ When to use: below every planner; it keeps the robot's body off what its centre 
 long narrow robot (the inscribed radius is a circle; use ``tilt`` or a footprint check besides).
 Rule of mesh_navigation: ``lethal_value`` at the lethal vertices, ``inscribed_value`` up to the inscribed radius, then
 ``inscribed_value * exp(-cost_scaling_factor (d - inscribed_radius))`` up to the inflation radius, 0 beyond. Deviations:
-isolated lethal vertices are inflated too, with ``source_cost`` also vertices that are not lethal, and a change of the
-input repairs the distances instead of starting over, and ``inscribed_value`` is 1 by default instead of 0.99: planners
-would pass where the robot touches. Beyond the inscribed radius costs are always less than that, also where the fall-off
-is 0. The repulsive vectors are not offered; our planners do not steer
-by them.
+isolated lethal vertices are inflated too, distances are measured straight from them and past convex corners (see
+``kernels/layers/front_offers.py``), with ``source_cost`` also vertices that are not lethal are inflated, a change of
+the input repairs the distances instead of starting over, and ``inscribed_value`` is 1 by default instead of 0.99:
+planners would pass where the robot touches. Beyond the inscribed radius costs are always less than that, also where the
+fall-off is 0. The repulsive vectors are not offered; our planners do not steer by them.
 Cost: linear in the vertices within the radius; an update in the vertices whose distance changes.
 """
 
@@ -109,7 +109,7 @@ class InflationLayer(MeshLayer):
     def _drop_all(self) -> None:
         count = self.topology.vertex_count
         self.distances = np.full(count, np.inf, dtype=np.float32)
-        self._nearest = np.full((count, 2), -1, dtype=np.int32)
+        self._made_from = np.full((count, 3), -1, dtype=np.int32)
         # Which vertices are sources now, and of which the distances are.
         self._is_source, self._known_sources = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
 
@@ -123,7 +123,7 @@ class InflationLayer(MeshLayer):
             self._known_sources,
             changed,
             self.distances,
-            self._nearest,
+            self._made_from,
         )
         return set_fading_costs(
             self.distances,

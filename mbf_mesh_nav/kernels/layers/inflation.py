@@ -1,11 +1,9 @@
 """Geodesic distance from lethal vertices over the surface, from scratch and repaired after a change.
 
-The distance of a vertex is the fixed point of "the least of what the edges and the faces around it offer". A face
-offers the arrival of a straight wave front (Kimmel and Sethian 1998, with the acceptance test of mesh_navigation), an
-edge offers its length; the edge offers let an isolated lethal vertex spread, which mesh_navigation cannot. Since every
-offer exceeds what it is made from, the fixed point is unique: vertices may be worked off in any order, and a repair
-gives the same values as a new start. The order is first come, first served: the waves are only some rings wide, and a
-stack visits a fifth more.
+The distance of a vertex is the fixed point of "the least of what the edges and the faces around it offer": an edge
+offers its length, a face what the fronts that passed its other two corners make of them (``front_offers``). Since every
+offer exceeds what it is made from, the fixed point is unique, though a lower distance of another front may offer more:
+vertices may be worked off in any order, and a repair gives the same values as a new start (``distance_wave``).
 """
 
 from __future__ import annotations
@@ -14,65 +12,31 @@ from typing import Any
 
 import numpy as np
 
-from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel, plain_kernel
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, IntArray
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inlined_kernel, inner_array_kernel, inner_kernel, kernel
 from mbf_mesh_nav.kernels.fill import fill
+from mbf_mesh_nav.kernels.layers.distance_wave import (
+    DROPPED,
+    DROPPED_COUNT,
+    TOUCHED_COUNT,
+    UNUSED,
+    Wave,
+    drop,
+    drop_dependents,
+    enqueue,
+    is_any_due,
+    lower,
+    next_vertex,
+    touch,
+)
+from mbf_mesh_nav.kernels.layers.front_offers import centre_beyond, edge_offer, pair_offer, squared_length
 from mbf_mesh_nav.kernels.mesh.surface import Surface
-from mbf_mesh_nav.kernels.search.near_far import after
+from mbf_mesh_nav.kernels.search.near_far import UNQUEUED
 
-RIGHT_ANGLE_TOLERANCE = 1e-9
-_WAITING: Any = np.uint8(1)
-_TOUCHED: Any = np.uint8(2)
-
-
-@plain_kernel
-def front_arrival(d1: float, d2: float, bb: float, aa: float, dot: float) -> float:
-    """Distance of corner v3 offered by its face whose corners v1, v2 are at ``d1``, ``d2``; inf if the front misses it.
-
-    Parameters
-    ----------
-    d1, d2 : float
-        Distances of v1 and v2 [m].
-    bb, aa : float
-        Squared lengths of the edges v3-v1 and v3-v2 [m^2].
-    dot : float
-        Inner product of the edge vectors v1-v3 and v2-v3 [m^2].
-
-    Notes
-    -----
-    With t = d3 - d1 and u = d2 - d1: ``cc t^2 + 2 u (dot - bb) t + bb u^2 - (aa bb - dot^2) = 0``, larger root,
-    accepted if ``u < t`` and the front comes through between the two edges.
-    """
-    u = d2 - d1
-    cc = aa + bb - 2.0 * dot
-    half = u * (dot - bb)
-    discriminant = half * half - cc * (bb * u * u - (aa * bb - dot * dot))
-    if discriminant < 0.0 or cc <= 0.0 or dot < -RIGHT_ANGLE_TOLERANCE * (aa + bb):
-        return np.inf
-    t = (-half + np.sqrt(discriminant)) / cc
-    if u < t and dot * t < bb * (t - u) and dot * (t - u) < aa * t:
-        arrival: float = d1 + t
-        return arrival
-    return np.inf
-
-
-@inner_kernel
-def face_offer(vertices: FloatArray, vertex: int, v1: int, d1: float, v2: int, d2: float) -> tuple[float, int, int]:
-    """Return the least distance one face offers its corner ``vertex``, and the one or two corners it comes from."""
-    aa = bb = dot = 0.0
-    for axis in range(3):
-        to_v1 = vertices[v1, axis] - vertices[vertex, axis]
-        to_v2 = vertices[v2, axis] - vertices[vertex, axis]
-        bb += to_v1 * to_v1
-        aa += to_v2 * to_v2
-        dot += to_v1 * to_v2
-    arrival = front_arrival(d1, d2, bb, aa, dot) if d1 < np.inf and d2 < np.inf else np.inf
-    along_first, along_second = d1 + np.sqrt(bb), d2 + np.sqrt(aa)
-    if arrival < min(along_first, along_second):
-        return arrival, v1, v2
-    if along_first <= along_second:
-        return along_first, v1, v1
-    return along_second, v2, v2
+STEP: Any = np.float32(0.125)
+"""Share of the radius by which the threshold of the near list grows: about an edge on usual maps."""
+_NOT_LONGER: Any = np.float32(0.998)
+"""Of a squared length: an edge that is longer than the gap by more offers nothing, whatever is rounded."""
 
 
 @kernel
@@ -121,7 +85,7 @@ def repair_distances(
     known_lethal: BoolArray,
     changed: IntArray,
     distances: Float32Array,
-    sources: IntArray,
+    made_from: IntArray,
 ) -> tuple[IntArray, int]:
     """Bring the distances up to date after some vertices became lethal or ceased to be; from scratch is a case of it.
 
@@ -133,9 +97,9 @@ def repair_distances(
         The flags now, and those the distances are of; the latter are brought up to date.
     changed : (c,) int32
         Vertices whose flags may differ.
-    distances, sources : (V,) float32 [m], (V, 2) int32
-        Distance to the nearest lethal vertex (inf beyond the radius) and the one or two vertices it was made from
-        (-1 without); changed in place.
+    distances, made_from : (V,) float32 [m], (V, 3) int32
+        Distance to the nearest lethal vertex or edge (inf beyond the radius), the one or two vertices it was made from
+        and the centre of its front (-1 without); changed in place.
 
     Returns
     -------
@@ -144,77 +108,139 @@ def repair_distances(
     flips : int
         Number of vertices whose flag changed.
     """
-    vertices, faces, face_offsets = surface.vertices, surface.faces, surface.vertex_face_offsets
-    neighbour_offsets, neighbours = surface.neighbour_offsets, surface.neighbours
-    count, reach = len(vertices), np.float32(radius)
-    touched = np.empty(count, dtype=np.int32)
-    queue = np.empty(count + 1, dtype=np.int32)
-    state = np.empty(count, dtype=np.uint8)
-    fill(state, Count(0))
-    size, head, tail = Index(0), Index(0), Index(0)
+    wave = _wave_of(distances, made_from, np.float32(radius))
+    counts, touched, dropped, step = wave.counts, wave.touched, wave.dropped, STEP * wave.limits[1]
     # 1. New lethal vertices are at distance 0, former ones at none.
     for changed_vertex in changed:
         vertex = Index(changed_vertex)
-        if lethal[vertex] == known_lethal[vertex]:
-            continue
-        known_lethal[vertex] = lethal[vertex]
-        distances[vertex] = np.float32(0.0) if lethal[vertex] else np.float32(np.inf)
-        sources[vertex, 0] = sources[vertex, 1] = -1
-        state[vertex] = _TOUCHED
-        touched[size] = vertex
-        size += ONE
-    flips = size
-    # 2. Invalidate every distance that came, directly or not, from a former one.
-    reader = Index(0)
-    while reader < size:
-        vertex = Index(touched[reader])
-        reader += ONE
-        if lethal[vertex]:
-            continue
-        for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
-            other = Index(neighbours[slot])
-            if Index(sources[other, 0]) == vertex or Index(sources[other, 1]) == vertex:
-                distances[other] = np.inf
-                sources[other, 0] = sources[other, 1] = -1
-                state[other] = _TOUCHED
-                touched[size] = other
-                size += ONE
-    # 3. Offers come from the boundary of new lethal regions, and from what is known beside the invalidated.
-    for index in range(size):
+        if lethal[vertex] != known_lethal[vertex]:
+            known_lethal[vertex] = lethal[vertex]
+            _flip(wave, vertex, lethal[vertex])
+    flips = Index(counts[TOUCHED_COUNT])
+    # 2. Drop every distance that came, directly or not, from what they had before.
+    for index in range(flips):
         vertex = Index(touched[index])
-        for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
-            other = Index(neighbours[slot])
-            offering = vertex if lethal[vertex] else other
-            offers = distances[other] > 0.0 if lethal[vertex] else distances[other] < np.inf
-            if offers and state[offering] & _WAITING == 0:
-                state[offering] |= _WAITING
-                queue[tail] = offering
-                tail = after(tail, queue)
-    # 4. Vertices that were lowered offer to the faces around it, first come first served, until nothing is lowered.
-    while head != tail:
-        vertex = Index(queue[head])
-        head = after(head, queue)
-        state[vertex] &= ~_WAITING
-        reached = distances[vertex]
-        for position in range(Index(face_offsets[vertex]), Index(face_offsets[vertex + ONE])):
-            face = Index(surface.vertex_faces[position])
-            for corner in range(3):
-                other = Index(faces[face, corner])
-                if distances[other] <= reached:
-                    continue
-                # Corners in the order of the winding, so that rounding does not depend on the order of arrival.
-                v1, v2 = Index(faces[face, (corner + 1) % 3]), Index(faces[face, (corner + 2) % 3])
-                exact, first, second = face_offer(vertices, other, v1, distances[v1], v2, distances[v2])
-                offer = np.float32(exact)
-                if offer > reach or not offer < distances[other]:
-                    continue
-                distances[other] = offer
-                sources[other, 0], sources[other, 1] = first, second
-                if state[other] & _TOUCHED == 0:
-                    touched[size] = other
-                    size += ONE
-                if state[other] & _WAITING == 0:
-                    queue[tail] = other
-                    tail = after(tail, queue)
-                state[other] = _TOUCHED | _WAITING
-    return touched[:size].copy(), Count(flips)
+        if not lethal[vertex]:
+            drop(wave, vertex)
+        if wave.flags[vertex] & UNUSED == 0:
+            drop_dependents(surface, wave, vertex)
+    # 3. Offers come from the boundary of new lethal regions, and from what is known beside the vertices dropped.
+    for index in range(flips):
+        vertex = Index(touched[index])
+        if lethal[vertex] and _is_at_boundary(surface, distances, vertex):
+            enqueue(wave, vertex)
+    for index in range(Index(counts[DROPPED_COUNT])):
+        _enqueue_beside(surface, wave, Index(dropped[index]))
+    counts[DROPPED_COUNT] = Index(0)
+    # 4. Vertices that were lowered offer to those around them, about in the order of their distance, until none is.
+    while is_any_due(wave, step):
+        vertex = next_vertex(wave)
+        if distances[vertex] < np.inf:
+            _offer_along_edges(surface, wave, vertex)
+            _offer_across_faces(surface, wave, vertex)
+        for index in range(Index(counts[DROPPED_COUNT])):
+            _take_best_offer(surface, wave, Index(dropped[index]))
+        counts[DROPPED_COUNT] = Index(0)
+    return touched[: Index(counts[TOUCHED_COUNT])].copy(), Count(flips)
+
+
+@inner_array_kernel
+def _wave_of(distances: Float32Array, made_from: IntArray, reach: np.float32) -> Wave:
+    """Return a wave in which nothing waits."""
+    count = len(distances)
+    flags, queued = np.empty(count, dtype=np.uint8), np.empty(count, dtype=np.uint8)
+    touched, dropped = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
+    near, far = np.empty(count + 1, dtype=np.int32), np.empty(count, dtype=np.int32)
+    counts, limits = np.empty(5, dtype=np.uint64), np.empty(2, dtype=np.float32)
+    fill(flags, Count(0))
+    fill(queued, Count(UNQUEUED))
+    fill(counts, Index(0))
+    limits[0], limits[1] = np.float32(0.0), reach
+    return Wave(distances, made_from, flags, touched, dropped, near, far, queued, counts, limits)
+
+
+@inlined_kernel
+def _flip(wave: Wave, vertex: int, is_lethal: bool) -> None:
+    """Set a vertex that became lethal, or ceased to be."""
+    if wave.distances[vertex] == np.inf:
+        wave.flags[vertex] |= UNUSED
+    wave.distances[vertex] = np.float32(0.0) if is_lethal else np.float32(np.inf)
+    wave.made_from[vertex, 0] = wave.made_from[vertex, 1] = -1
+    wave.made_from[vertex, 2] = vertex if is_lethal else -1
+    touch(wave, vertex)
+
+
+@inner_kernel
+def _is_at_boundary(surface: Surface, distances: Float32Array, vertex: int) -> bool:
+    """Whether a lethal vertex has a neighbour that is not."""
+    for slot in range(Index(surface.neighbour_offsets[vertex]), Index(surface.neighbour_offsets[vertex + ONE])):
+        if distances[Index(surface.neighbours[slot])] > 0.0:
+            return True
+    return False
+
+
+@inner_kernel
+def _enqueue_beside(surface: Surface, wave: Wave, vertex: int) -> None:
+    """Let the neighbours of a dropped vertex that have a distance offer theirs once more."""
+    wave.flags[vertex] &= ~DROPPED
+    for slot in range(Index(surface.neighbour_offsets[vertex]), Index(surface.neighbour_offsets[vertex + ONE])):
+        other = Index(surface.neighbours[slot])
+        if wave.distances[other] < np.inf:
+            enqueue(wave, other)
+
+
+@inlined_kernel
+def _offer_along_edges(surface: Surface, wave: Wave, vertex: int) -> None:
+    """Lower the vertices around one along its edges."""
+    reached, centre = wave.distances[vertex], centre_beyond(wave.made_from, vertex)
+    for slot in range(Index(surface.neighbour_offsets[vertex]), Index(surface.neighbour_offsets[vertex + ONE])):
+        other = Index(surface.neighbours[slot])
+        gap = wave.distances[other] - reached
+        if gap > 0.0:
+            squared = squared_length(surface.vertices, vertex, other)
+            if gap * gap > _NOT_LONGER * squared:
+                lower(surface, wave, other, edge_offer(reached, squared, centre), vertex, vertex, centre)
+
+
+@inlined_kernel
+def _offer_across_faces(surface: Surface, wave: Wave, vertex: int) -> None:
+    """Lower the farthest corners of the faces around a vertex by the fronts at the other two.
+
+    Where the third corner waits it offers the same later.
+    """
+    distances, offsets = wave.distances, surface.vertex_face_offsets
+    reached = distances[vertex]
+    for position in range(Index(offsets[vertex]), Index(offsets[vertex + ONE])):
+        v1, v2 = _other_corners(surface, Index(surface.vertex_faces[position]), vertex)
+        far, near, first, second = (v1, v2, v2, vertex) if distances[v1] > distances[v2] else (v2, v1, vertex, v1)
+        if distances[far] > reached and distances[far] > distances[near] and wave.queued[near] == UNQUEUED:
+            limit = min(distances[far], wave.limits[1])
+            offer, centre = pair_offer(surface.vertices, distances, wave.made_from, far, first, second, limit)
+            lower(surface, wave, far, offer, first, second, centre)
+
+
+@inner_kernel
+def _take_best_offer(surface: Surface, wave: Wave, vertex: int) -> None:
+    """Give a dropped vertex the least of what is offered around it; what is set anew itself offers when it is due."""
+    vertices, distances, flags, made_from = surface.vertices, wave.distances, wave.flags, wave.made_from
+    flags[vertex] &= ~DROPPED
+    for position in range(Index(surface.vertex_face_offsets[vertex]), Index(surface.vertex_face_offsets[vertex + ONE])):
+        v1, v2 = _other_corners(surface, Index(surface.vertex_faces[position]), vertex)
+        offers1 = distances[v1] < distances[vertex] and flags[v1] & UNUSED == 0
+        offers2 = distances[v2] < distances[vertex] and flags[v2] & UNUSED == 0
+        for giver, offers in ((v1, offers1), (v2, offers2)):
+            if offers:
+                centre = centre_beyond(made_from, giver)
+                offer = edge_offer(distances[giver], squared_length(vertices, giver, vertex), centre)
+                lower(surface, wave, vertex, offer, giver, giver, centre)
+        if offers1 and offers2:
+            limit = min(distances[vertex], wave.limits[1])
+            offer, centre = pair_offer(vertices, distances, made_from, vertex, v1, v2, limit)
+            lower(surface, wave, vertex, offer, v1, v2, centre)
+
+
+@inner_kernel
+def _other_corners(surface: Surface, face: int, vertex: int) -> tuple[int, int]:
+    """Return the other two corners of a face in the order of its winding, so that rounding is always the same."""
+    v0, v1, v2 = Index(surface.faces[face, 0]), Index(surface.faces[face, 1]), Index(surface.faces[face, 2])
+    return (v1, v2) if v0 == vertex else (v2, v0) if v1 == vertex else (v0, v1)
