@@ -19,9 +19,12 @@ from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, plain_kern
 
 STRAIGHT: Any = Count(2**30)
 """Added to the centre of a straight front."""
-GRAZING = 1e-3
-"""By how much of the side a circular front may miss it and pass nonetheless: straight on along an edge, but for
-rounding."""
+GRAZING = 0.2
+"""By how much of the side a circular front may miss it and pass nonetheless.
+
+On ground that is not flat, lines from one centre to vertices in a row miss all sides by a little. What is measured is
+shorter than the bent line by the square of this, about a fiftieth of an edge.
+"""
 ALONG_EDGE = 1e-2
 """Share of the side from its end within which a straight front is one along the edge from there."""
 OBTUSE = -0.05

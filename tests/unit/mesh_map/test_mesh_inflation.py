@@ -175,7 +175,7 @@ def test_distances_equal_those_of_a_heap(seed, radius, share):
 
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 10_000), st.sampled_from([0.002, 0.03, 0.2]), st.booleans())
-def test_repair_after_added_and_removed_obstacles_equals_a_new_start_to_the_last_bit(seed, share, is_grid):
+def test_repair_after_added_and_removed_obstacles_equals_a_new_start(seed, share, is_grid):
     rng = np.random.default_rng(seed)
     mesh = bumpy(seed) if is_grid else scattered(seed, 0.05)
     source, inflation = chain(mesh, rng.random(len(mesh.vertices)) < 2.0 * share, inflation_radius=0.5)
