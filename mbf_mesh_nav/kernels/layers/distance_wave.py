@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import Float32Array, IntArray
-from mbf_mesh_nav.kernels.compiled import ONE, Index, inlined_kernel, inner_kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inlined_kernel, inner_kernel
+from mbf_mesh_nav.kernels.layers.front_offers import comes_first
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.search.near_far import IN_FAR, IN_NEAR, UNQUEUED, after, raise_threshold
 
@@ -127,9 +128,11 @@ def drop_dependents(surface: Surface, wave: Wave, vertex: int) -> None:
 
 @inner_kernel
 def lower(surface: Surface, wave: Wave, vertex: int, distance: np.float32, v1: int, v2: int, centre: int) -> None:
-    """Set a distance if it is lower, or of a front of lower number, and drop what was made from the one before."""
+    """Set a distance if it is lower, or as low and of a front that comes first, and drop what was made of the other."""
     before, made_from = wave.distances[vertex], wave.made_from
-    if distance > wave.limits[1] or distance > before or (distance == before and centre >= made_from[vertex, 2]):
+    if distance > wave.limits[1] or distance > before:
+        return
+    if distance == before and not comes_first(surface.vertices, centre, Count(made_from[vertex, 2])):
         return
     wave.distances[vertex] = distance
     made_from[vertex, 0], made_from[vertex, 1], made_from[vertex, 2] = v1, v2, centre

@@ -100,6 +100,18 @@ def squared_length(vertices: FloatArray, start: int, end: int) -> float:
 
 
 @inner_kernel
+def comes_first(vertices: FloatArray, front: int, other: int) -> bool:
+    """Whether, of two fronts as far, the first one counts: by kind and place, which no numbering changes."""
+    if front == other or (front >= STRAIGHT) != (other >= STRAIGHT):
+        return front < other
+    first, second = Index(front & ~STRAIGHT), Index(other & ~STRAIGHT)
+    for axis in range(3):
+        if vertices[first, axis] != vertices[second, axis]:
+            return bool(vertices[first, axis] < vertices[second, axis])
+    return front < other
+
+
+@inner_kernel
 def centre_beyond(made_from: IntArray, vertex: int) -> int:
     """Centre of the front behind a vertex, along an edge: a straight one stays so, a circular one bends there."""
     centre = Count(made_from[vertex, 2])
@@ -178,7 +190,7 @@ def _where_fronts_meet(
     cc = aa + bb - 2.0 * dot
     least = _least_arrival(vertices, distances, vertex, front, cc)
     least_of_other = _least_arrival(vertices, distances, vertex, other, cc)
-    if least_of_other < least or (least_of_other == least and other < front):
+    if least_of_other < least or (least_of_other == least and comes_first(vertices, other, front)):
         least, front = least_of_other, other
     return (least, front) if least > arrival else (arrival, straight)
 

@@ -166,7 +166,7 @@ def test_distance_over_rough_ground_is_that_of_the_shortest_way_over_its_faces_t
     excess = inflation.distances[near] - true[near]
     assert excess.min() > -0.3 * 0.1  # of an edge
     assert np.abs(np.mean(excess / true[near])) < 0.025
-    assert np.quantile(excess / true[near], 0.95) < 0.065
+    assert np.quantile(excess / true[near], 0.95) < 0.09
 
 
 @pytest.mark.parametrize("fold", [30.0, 90.0, 150.0])

@@ -118,8 +118,9 @@ def test_floor_is_lava_plateaus_are_joined_up_to_0_35_m_and_cut_at_0_4(
 ):
     mesh_map = reference_chain(shared_data / "meshes/mesh_navigation_tutorials/floor_is_lava_map.ply", inscribed_radius)
 
-    near_end = region_of(mesh_map, [-0.7, -7.25, -0.11], 0.99)
-    far_end = region_of(mesh_map, [6.7, 0.25, -0.12], 0.99)
+    # Costs below 1: the far end itself is 0.403 m from the border.
+    near_end = region_of(mesh_map, [-0.7, -7.25, -0.11], 1.0)
+    far_end = region_of(mesh_map, [6.7, 0.25, -0.12], 1.0)
 
     assert (near_end == far_end) is connected
 
