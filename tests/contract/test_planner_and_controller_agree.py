@@ -68,7 +68,7 @@ OTHER_ROBOTS = (
     ("costmap", "astar", "dwa", 2010), ("costmap", "straight_line", "dwa", 2018),
     ("mesh", "cvp", "vector_field", 2007), ("mesh", "repairing", "path_follower", 2007),
     ("mesh", "heading_astar", "mppi", 2007), ("mesh", "cvp", "follow_path", 2018),
-    ("mesh", "cvp", "path_follower", 2148), ("mesh", "dijkstra", "path_follower", 2167),
+    ("mesh", "dijkstra", "mppi", 2258), ("mesh", "dijkstra", "path_follower", 2167),
     ("mesh", "cvp", "vector_field", 2157), ("mesh", "repairing", "follow_path", 2243),
     ("costmap", "straight_line", "dwa", 2183), ("costmap", "straight_line", "follow_path", 2183),
     ("costmap", "hybrid_astar", "rotation_shim", 2183), ("costmap", "dijkstra", "rotation_shim", 2257),

@@ -29,8 +29,9 @@ ALONG_EDGE = 1e-2
 """Share of the side from its end within which a straight front is one along the edge from there."""
 OBTUSE = -0.05
 """An angle is obtuse, where two straight fronts meet, if its cosine is below about twice this."""
-BENT = 1.00001
-"""Factor of edges after which a path bends: one that does not is preferred where they are as long, but for rounding."""
+DIRECT = 0.99999
+"""Factor of the last piece of a line from a centre: of two ways as long, but for rounding, the one without a bend is
+taken."""
 
 
 @plain_kernel
@@ -119,13 +120,6 @@ def centre_beyond(made_from: IntArray, vertex: int) -> int:
 
 
 @inner_kernel
-def edge_offer(distance: np.float32, squared: float, centre: int) -> np.float32:
-    """Distance at the end of an edge from a vertex at ``distance``; ``centre`` as of ``centre_beyond``."""
-    length = np.sqrt(squared)
-    return np.float32(distance + (length if distance == 0.0 or centre >= STRAIGHT else BENT * length))
-
-
-@inner_kernel
 def pair_offer(
     vertices: FloatArray,
     distances: Float32Array,
@@ -152,6 +146,7 @@ def pair_offer(
     if front == other and front < STRAIGHT:
         to_centre = float(distances[Index(front)])
         arrival = to_centre + circular_arrival(d1 - to_centre, d2 - to_centre, bb, aa, dot)
+        arrival += (DIRECT - 1.0) * (arrival - max(d1, d2))
     else:
         arrival, is_nearer_first = straight_arrival(d1, d2, bb, aa, dot)
         straight = (front if is_nearer_first else other) | STRAIGHT

@@ -29,7 +29,7 @@ from mbf_mesh_nav.kernels.layers.distance_wave import (
     next_vertex,
     touch,
 )
-from mbf_mesh_nav.kernels.layers.front_offers import centre_beyond, edge_offer, pair_offer, squared_length
+from mbf_mesh_nav.kernels.layers.front_offers import centre_beyond, pair_offer, squared_length
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.search.near_far import UNQUEUED
 
@@ -199,7 +199,7 @@ def _offer_along_edges(surface: Surface, wave: Wave, vertex: int) -> None:
         if gap > 0.0:
             squared = squared_length(surface.vertices, vertex, other)
             if gap * gap > _NOT_LONGER * squared:
-                lower(surface, wave, other, edge_offer(reached, squared, centre), vertex, vertex, centre)
+                lower(surface, wave, other, np.float32(reached + np.sqrt(squared)), vertex, vertex, centre)
 
 
 @inlined_kernel
@@ -230,9 +230,8 @@ def _take_best_offer(surface: Surface, wave: Wave, vertex: int) -> None:
         offers2 = distances[v2] < distances[vertex] and flags[v2] & UNUSED == 0
         for giver, offers in ((v1, offers1), (v2, offers2)):
             if offers:
-                centre = centre_beyond(made_from, giver)
-                offer = edge_offer(distances[giver], squared_length(vertices, giver, vertex), centre)
-                lower(surface, wave, vertex, offer, giver, giver, centre)
+                offer = np.float32(distances[giver] + np.sqrt(squared_length(vertices, giver, vertex)))
+                lower(surface, wave, vertex, offer, giver, giver, centre_beyond(made_from, giver))
         if offers1 and offers2:
             limit = min(distances[vertex], wave.limits[1])
             offer, centre = pair_offer(vertices, distances, made_from, vertex, v1, v2, limit)

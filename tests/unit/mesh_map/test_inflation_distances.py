@@ -11,7 +11,7 @@ from inflated_ground import bumpy, chain, scattered
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from mbf_mesh_nav.kernels.layers.front_offers import BENT, OBTUSE, STRAIGHT, circular_arrival, straight_arrival
+from mbf_mesh_nav.kernels.layers.front_offers import DIRECT, OBTUSE, STRAIGHT, circular_arrival, straight_arrival
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
 
@@ -31,9 +31,7 @@ def naive_distances(mesh: MeshMap, lethal: np.ndarray, radius: float) -> tuple[n
                     continue
                 length = np.linalg.norm(mesh.vertices[corner] - mesh.vertices[v])
                 beyond = centre if centre >= STRAIGHT else v
-                offers = [
-                    (np.float32(distance + length * (1.0 if distance == 0.0 or beyond >= STRAIGHT else BENT)), beyond)
-                ]
+                offers = [(np.float32(distance + length), beyond)]
                 if v1 in settled and v2 in settled:
                     offers.append(naive_offer(mesh.vertices, corner, (v1, *settled[v1]), (v2, *settled[v2]), settled))
                 for offer, front in offers:
@@ -53,7 +51,7 @@ def naive_offer(vertices, corner, first, second, settled) -> tuple[np.float32, i
     if front1 == front2 < STRAIGHT:
         to_centre = settled[front1][0]
         arrival = to_centre + circular_arrival.py_func(d1 - to_centre, d2 - to_centre, *sides)
-        return np.float32(arrival), front1
+        return np.float32(arrival - (1.0 - DIRECT) * (arrival - max(d1, d2))), front1
     arrival, is_nearer_first = straight_arrival.py_func(d1, d2, *sides)
     straight = (front1 if is_nearer_first else front2) | STRAIGHT
     cosine = sides[2] / np.sqrt(sides[0] * sides[1])
@@ -125,7 +123,7 @@ def test_distance_past_a_vertex_and_past_a_convex_corner_is_exact_in_every_direc
     true = true_distances(mesh, lethal)
     near = true < 0.999
     assert near.sum() > 150
-    np.testing.assert_allclose(inflation.distances[near], true[near], atol=1e-5)
+    np.testing.assert_allclose(inflation.distances[near], true[near], atol=2e-5)
 
 
 LETHAL_SHAPES = {
@@ -183,7 +181,7 @@ def test_distance_across_folds_is_that_on_the_ground_laid_flat(fold):
 
     true = np.hypot(*(flat.vertices[zigzag.internal_to_input, :2] - 1.5).T)
     near = true < 0.999
-    np.testing.assert_allclose(inflation.distances[near], true[near], atol=1e-5)
+    np.testing.assert_allclose(inflation.distances[near], true[near], atol=2e-5)
 
 
 def test_distance_leads_round_the_end_of_a_slit():
@@ -204,11 +202,11 @@ def test_distance_leads_round_the_end_of_a_slit():
     assert (found >= round_the_end - 0.025).all()
 
 
-def test_distance_of_a_straight_wall_is_exact_but_for_rounding():
+def test_distance_of_a_straight_wall_is_exact():
     mesh = MeshMap.from_heights(np.zeros((9, 40)), 0.1, 0.1)
 
     _, inflation = chain(mesh, mesh.vertices[:, 0] < 0.05, inflation_radius=2.05)
 
     np.testing.assert_allclose(
-        inflation.distances[mesh.vertices[:, 0] <= 2.0], mesh.vertices[mesh.vertices[:, 0] <= 2.0, 0], rtol=2e-5
+        inflation.distances[mesh.vertices[:, 0] <= 2.0], mesh.vertices[mesh.vertices[:, 0] <= 2.0, 0], atol=1e-5
     )
