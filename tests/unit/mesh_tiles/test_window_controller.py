@@ -54,19 +54,19 @@ def test_a_path_that_a_controller_refuses_on_another_window_is_invalid(tiled_hil
 @pytest.mark.parametrize(
     ("more", "refused"),
     [
-        ("controllers: [{name: follower, type: path_follower}]\nfollower: {check_ahead_dist: 2.1}\n", ""),
+        ("controllers: [{name: follower, type: path_follower}]\nfollower: {check_ahead_dist: 1.3}\n", ""),
         (
             "controllers: [{name: follower, type: path_follower}]\nfollower: {check_ahead_dist: 4.0}\n",
-            r"'follower' \(path_follower\): .*expected more than 23.2 m, got 16 m; .* looks 5 m around the robot, "
-            "which drives 0 m between updates, and the layers look 0.8 m around a vertex",
+            r"'follower' \(path_follower\): .*expected more than 24.8 m, got 16 m; .* looks 5 m around the robot, "
+            "which drives 0 m between updates, and the layers look 1.2 m around a vertex",
         ),
         (
             "max_vel_x: 2.0\ncontrollers: [{name: follower, type: mppi}]\n",
-            "expected more than 17.6 m, got 16 m; .* looks 3.4 m around the robot, which drives 0.2 m between updates",
+            "expected more than 19.2 m, got 16 m; .* looks 3.4 m around the robot, which drives 0.2 m between updates",
         ),
         (
             "recovery_behaviors: [{name: out, type: escape}]\nout: {max_distance: 9.0}\n",
-            r"'out' \(escape\): .*expected more than 43.2 m, got 16 m; with its parameters it looks 10 m around",
+            r"'out' \(escape\): .*expected more than 44.8 m, got 16 m; with its parameters it looks 10 m around",
         ),
     ],
 )

@@ -41,8 +41,8 @@ def test_a_layer_takes_the_place_of_the_stored_one_of_its_name_and_adds_to_it(ti
         (
             "layers: [{name: o, type: obstacle}, {name: i, type: inflation, inputs: [o]}]\n"
             "  window: 4.0\n  i: {inflation_radius: 1.5}",
-            "the layers look 1.5 m around a vertex, a window of 4 m leaves 1 m around the robot: expected a window of "
-            "more than 6 m",
+            "the layers look 2.25 m around a vertex, a window of 4 m leaves 1 m around the robot: expected a window of "
+            "more than 9 m",
         ),
     ],
 )
