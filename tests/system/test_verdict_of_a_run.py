@@ -61,6 +61,6 @@ def test_a_sweep_reports_the_verdict_and_counts_no_success(rude, tmp_path):
     with SweepLog(tmp_path / "sweep" / "runs.jsonl") as log:
         (row,) = log.rows.values()
     assert row["success"] is False and row["verdict"].startswith("ARRIVED WITH FAILURES: ")
-    assert f"seed 1 : {row['verdict']}" in swept.stdout
+    assert f"seed 1: {row['verdict']}" in swept.stdout
     assert "ARRIVED WITH FAILURES: " in (tmp_path / "sweep" / "sweep.csv").read_text()
     assert 'class="arrived"' in (tmp_path / "sweep" / "sweep.html").read_text()
