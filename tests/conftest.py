@@ -2,11 +2,13 @@
 
 import gc
 import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from numba.core import event
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
@@ -17,6 +19,34 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeat"))
 
 LONGEST = ("unit/actions/test_interleavings.py", "determinism/", "system/ros2/test_actions_and_services.py")
 """Files of minutes. A worker takes a file whole, so these come first: the last ones to begin are short."""
+
+
+class UncountedCompiler(event.Listener):
+    """Holds the time limit of a test while numba compiles, on any thread, as patience of the product is held.
+
+    The kernels of one planner are half a minute of CPU on a machine that has none; beside eight other programs that is
+    more than the two minutes that a test has.
+    """
+
+    def __init__(self) -> None:
+        self._depth, self._left = 0, 0.0
+
+    def on_start(self, event: event.Event) -> None:
+        """A compilation begins, perhaps within another one."""
+        self._depth += 1
+        if self._depth == 1:
+            self._left, _ = signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+    def on_end(self, event: event.Event) -> None:
+        """It has ended; its test, whose limit goes on, perhaps before."""
+        self._depth -= 1
+        test_runs = callable(signal.getsignal(signal.SIGALRM)) and signal.getitimer(signal.ITIMER_REAL)[0] == 0.0
+        if self._depth == 0 and self._left > 0.0 and test_runs:
+            signal.setitimer(signal.ITIMER_REAL, self._left)
+
+
+if hasattr(signal, "setitimer"):  # elsewhere than on Windows; it is what pytest-timeout uses
+    event.register("numba:compile", UncountedCompiler())
 
 
 @pytest.fixture(scope="module")
