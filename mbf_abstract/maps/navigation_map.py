@@ -17,8 +17,9 @@ from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.maps.avoided_places import AvoidedPlace
 from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.maps.tracking.contact import SAME_STOREY, RobotBox
+from mbf_abstract.maps.tracking.contact import SAME_STOREY
 from mbf_abstract.maps.tracking.objects import TrackedObject
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 from mbf_abstract.maps.view import FloorMap, FloorWindow
 
 PlaceCheck = Callable[[Pose], PlaceAnswer]

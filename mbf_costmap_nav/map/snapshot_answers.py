@@ -15,7 +15,7 @@ from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
-from mbf_abstract.maps.tracking.contact import RobotBox
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 from mbf_costmap_nav.grid.contact import contact_depth
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint

@@ -10,7 +10,7 @@ from pydantic import field_validator
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.disc_map import disc_radius
 from mbf_abstract.maps.layered_map import LayeredMap
-from mbf_abstract.maps.tracking.contact import RobotBox
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 from mbf_abstract.parameters import ParameterError, ParameterModel, parameter
 from mbf_mesh_nav.map.layer import LayerParameters
 from mbf_mesh_nav.mesh.motion_check import UNKNOWN_RADIUS

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Path
-from mbf_abstract.maps.tracking.contact import SAME_STOREY, RobotBox
+from mbf_abstract.maps.tracking.contact import SAME_STOREY
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 
 STEP = 0.2
 """Time [s] between two looks at where a moving object will be."""

@@ -6,6 +6,9 @@ time, then the robot brakes (``braking.py``); objects keep their velocities unti
 noticed after ``turning_time``; until then the object may be wherever it gets at its pace, the greatest speed of late.
 While somebody who moves is nearer than the margin, or touches it, the robot stands.
 
+Who waits may set off, and may have done so at a speed that does not show yet. Where the robot could not stand before
+they touch it, it passes them at ``passing_speed``. It does not stop for them, as most stay where they are.
+
 Who comes from behind, hardly faster than the robot drives away, follows it: to brake would bring about the contact that
 it is to avoid. So their velocity counts for the ``turning_time`` only, until which they notice what the robot does.
 """
@@ -14,14 +17,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.maps.tracking.braking import Decelerations, motions_to_standstill
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 from mbf_abstract.parameters import ParameterModel, parameter
 
 SHARES = (1.0, 0.75, 0.5, 0.25)
@@ -30,8 +33,6 @@ AWAY = 0.7
 """A robot drives away from somebody where the cosine between its way and that from them to it is at least this."""
 FOLLOWING = 0.1
 """Who follows is no faster [m/s] than the robot drives away, but for this: estimates of velocities are not exact."""
-CORNERS = 16
-"""Of the outline of a round robot."""
 SAME_STOREY = 1.0
 """Objects whose ground is farther above or below the robot [m] are on another storey, on a map that knows heights."""
 
@@ -54,51 +55,17 @@ class ContactParameters(ParameterModel):
     )
     decel_lim_x: float = parameter(0.5, "Deceleration of the robot.", unit="m/s^2", gt=0.0, le=100.0)
     decel_lim_theta: float = parameter(1.0, "Deceleration of its turns.", unit="rad/s^2", gt=0.0, le=100.0)
+    passing_speed: float = parameter(
+        0.3,
+        "Speed at which the robot passes somebody who waits where it could not stand if they set off; slower commands "
+        "are followed as they are.",
+        unit="m/s",
+        gt=0.0,
+        le=100.0,
+    )
     max_wait: float = parameter(
         10.0, "The path is blocked once the robot has waited for moving objects for this long.", unit="s", ge=0.0
     )
-
-
-class RobotBox(NamedTuple):
-    """The robot's outline for contacts: a box in its own frame [m], grown by a radius [m] to all sides.
-
-    A round robot is a box without extent and its radius.
-    """
-
-    back: float
-    front: float
-    right: float
-    left: float
-    radius: float
-
-    @classmethod
-    def disc(cls, radius: float) -> RobotBox:
-        """Box of a round robot of a radius [m]."""
-        return cls(0.0, 0.0, 0.0, 0.0, radius)
-
-    @classmethod
-    def around(cls, corners: ArrayLike) -> RobotBox:
-        """Box around an outline with ``corners`` (n, 2) [m], x forward and y left."""
-        outline = np.asarray(corners, dtype=np.float64)
-        (back, right), (front, left) = outline.min(axis=0).tolist(), outline.max(axis=0).tolist()
-        return cls(back, front, right, left, 0.0)
-
-    def outline(self) -> FloatArray:
-        """Corners (n, 2) [m], counter-clockwise; of a polygon around a round robot."""
-        if self.radius > 0.0:
-            angles = 2.0 * math.pi * np.arange(CORNERS) / CORNERS
-            return self.radius * np.array([(math.cos(angle), math.sin(angle)) for angle in angles.tolist()])
-        corners = (self.back, self.right), (self.front, self.right), (self.front, self.left), (self.back, self.left)
-        return np.array(corners, dtype=np.float64)
-
-    def gaps(self, poses: FloatArray, places: FloatArray, radii: FloatArray) -> FloatArray:
-        """Gaps (n, m) [m] of the robot at ``poses`` (n, 3) to discs at ``places`` (n, m, 2)."""
-        dx, dy = places[:, :, 0] - poses[:, None, 0], places[:, :, 1] - poses[:, None, 1]
-        c, s = np.cos(poses[:, None, 2]), np.sin(poses[:, None, 2])
-        ahead, aside = c * dx + s * dy, c * dy - s * dx
-        beyond_x = np.maximum(np.maximum(self.back - ahead, ahead - self.front), 0.0)
-        beyond_y = np.maximum(np.maximum(self.right - aside, aside - self.left), 0.0)
-        return np.asarray(np.hypot(beyond_x, beyond_y) - self.radius - radii)
 
 
 def moving_on_storey(
@@ -108,8 +75,18 @@ def moving_on_storey(
     return [known for known in objects if known.motion is Motion.MOVING and abs(known.z - z) < same_storey]
 
 
+def waiting_on_storey(
+    objects: Iterable[TrackedObject], z: float, same_storey: float = SAME_STOREY
+) -> list[TrackedObject]:
+    """Those of the objects that wait and may set off, on the storey of a robot at height ``z`` [m]."""
+    waiting = (known for known in objects if known.motion is Motion.WAITING and known.pace > 0.0)
+    return [known for known in waiting if abs(known.z - z) < same_storey]
+
+
 def in_the_way(known: TrackedObject) -> str:
-    """Text on an object that the robot waits for."""
+    """Text on an object before which the robot slows down or waits."""
+    if known.motion is Motion.WAITING:
+        return f"object {known.number} waits beside the way, at ({known.x:.2f}, {known.y:.2f})"
     return f"object {known.number} moves in the way, at ({known.x:.2f}, {known.y:.2f})"
 
 
@@ -133,25 +110,49 @@ def safe_share(
     command : Twist
         What it is about to follow.
     objects : sequence of TrackedObject
-        Those that move on the robot's storey count; all are of the same moment.
+        Those that move or wait on the robot's storey count; all are of the same moment.
     same_storey : float
         What is farther above or below [m] is on another storey.
 
     Returns
     -------
     share : float
-        One of ``SHARES``, or 0.
+        One of ``SHARES``, 0, or that of the ``passing_speed``.
     touched : TrackedObject or None
         What the robot would touch first with the whole command; None where the share is 1.
     """
-    near = moving_on_storey(objects, pose.z, same_storey)
-    if not near or command.is_stopped(1e-9, 1e-9):
+    if command.is_stopped(1e-9, 1e-9):
+        return 1.0, None
+    moving = moving_on_storey(objects, pose.z, same_storey)
+    share, touched = _share_before(moving, box, pose, velocity, command, limits)
+    waiting = waiting_on_storey(objects, pose.z, same_storey)
+    if not waiting or share * command.speed <= limits.passing_speed:
+        return share, touched
+    shares = [one for one in SHARES if limits.passing_speed / command.speed < one <= share]
+    for share in [*shares, limits.passing_speed / command.speed]:
+        found = _first_reached(box, pose, velocity, command, share, waiting, limits)
+        if found is None:
+            break
+        touched = touched or found
+    return share, touched
+
+
+def _share_before(
+    moving: Sequence[TrackedObject],
+    box: RobotBox,
+    pose: Pose,
+    velocity: Twist,
+    command: Twist,
+    limits: ContactParameters,
+) -> tuple[float, TrackedObject | None]:
+    """Largest share with which the robot can stand before any contact with those who move, and what it would touch."""
+    if not moving:
         return 1.0, None
     touched = None
-    apart = _gaps_now(box, pose, near) > limits.contact_margin
+    apart = _gaps_now(box, pose, moving) > limits.contact_margin
     for share in SHARES:
-        left = apart & [is_left_behind(known, pose, velocity, command, share) for known in near]
-        found = _first_contact(box, pose, velocity, command, share, near, left, limits)
+        left = apart & [is_left_behind(known, pose, velocity, command, share) for known in moving]
+        found = _first_contact(box, pose, velocity, command, share, moving, left, limits)
         if found is None:
             return share, touched
         touched = touched or found
@@ -217,4 +218,30 @@ def _first_contact(
             contact |= box.gaps(poses, np.broadcast_to(middles, places.shape), radii + ways) < 0.0
         if contact.any():
             return objects[int(np.argmax(contact[int(np.argmax(contact.any(axis=1)))]))]
+    return None
+
+
+def _first_reached(
+    box: RobotBox,
+    pose: Pose,
+    velocity: Twist,
+    command: Twist,
+    share: float,
+    waiting: Sequence[TrackedObject],
+    limits: ContactParameters,
+) -> TrackedObject | None:
+    """Who might touch the robot before it stands if they set off now; each grows at its pace to all sides.
+
+    Those from whom the robot only gets away do not count.
+    """
+    now = _gaps_now(box, pose, waiting)
+    middles = np.array([(known.x, known.y) for known in waiting])
+    radii, paces = np.array([(known.radius, known.pace) for known in waiting]).T
+    braking = Decelerations(limits.decel_lim_x, limits.decel_lim_theta, limits.reaction_time)
+    for times, poses in motions_to_standstill(pose, velocity, command, share, braking):
+        places = np.broadcast_to(middles, (len(times), *middles.shape))
+        gaps = box.gaps(poses, places, radii)
+        reached = (gaps < times[:, None] * paces) & (gaps < now)
+        if reached.any():
+            return waiting[int(np.argmax(reached[int(np.argmax(reached.any(axis=1)))]))]
     return None

@@ -51,7 +51,8 @@ class TrackedObject:
         Time of all this [s].
     pace : float
         Greatest estimated speed of late [m/s]. Where an object turns round, the estimate of its velocity falls on its
-        way to the other side, and its speed does not.
+        way to the other side, and its speed does not. Of one who waits the speed at which it would not be noticed to
+        set off; 0 once it is parked.
     course : tuple of float
         Which way it was seen to come last [m], along the axes of that frame, also while it stands; (0, 0) = it was
         never seen to move.

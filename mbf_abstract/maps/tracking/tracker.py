@@ -25,6 +25,7 @@ from mbf_abstract.maps.tracking.kernels.clustering import bounding_boxes, cluste
 from mbf_abstract.maps.tracking.kernels.occlusion import find_free_sides
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.maps.tracking.rays import Rays
+from mbf_abstract.maps.tracking.setting_off import seems_to_move, unnoticed_speed
 from mbf_abstract.parameters import ParameterModel, parameter
 
 MAX_POINTS = 2000
@@ -202,29 +203,21 @@ class Tracker:
             For when [s] their places are given.
         guarded : bool
             For the guard that stops the robot before contact. Two things differ then: objects that ``clear`` has hidden
-            are among them; and an object that was first seen less than ``standing_time`` ago, or has moved before, is
-            moving as soon as its estimated speed would take it ``moving_distance`` far in that time. To wait until it
-            has come so far would be too late where somebody comes out from behind a corner, or goes on after a wait.
+            are among them; and an object is moving as soon as it seems to (``setting_off.py``).
         """
         shown = self._confirmed() & (guarded | (self._room[:, states_of.CLEARED] == 0.0))
         rows = np.flatnonzero(shown).tolist()
         alike = (self._object(self._room[row].tolist(), int(self._numbers[row]), now, guarded) for row in rows)
         return tuple(known for known in alike if known.unseen <= self.parameters.forget_time)
 
-    def _seems_to_move(self, state: list[float], now: float) -> bool:
-        """Whether an object that was first seen a moment ago, or has moved before, is fast enough to be moving."""
-        p = self.parameters
-        speed = math.hypot(state[states_of.VX], state[states_of.VY])
-        may_move = bool(state[states_of.HAS_MOVED]) or now - state[states_of.FIRST_SEEN] <= p.standing_time
-        return may_move and speed * p.standing_time >= p.moving_distance
-
     def _object(self, state: list[float], number: int, now: float, guarded: bool) -> TrackedObject:
         p, later = self.parameters, max(now - self._time, 0.0)
         stood = max(now - state[states_of.ANCHOR_TIME], 0.0)
         moves = bool(state[states_of.HAS_MOVED]) and stood <= p.standing_time
-        moves = moves or (guarded and self._seems_to_move(state, now))
+        moves = moves or (guarded and seems_to_move(state, now, p.moving_distance, p.standing_time))
         motion = Motion.MOVING if moves else Motion.PARKED if stood > p.parked_time else Motion.WAITING
         vx, vy = (state[states_of.VX], state[states_of.VY]) if moves else (0.0, 0.0)
+        pace = unnoticed_speed(p.moving_distance, p.standing_time) if motion is Motion.WAITING else 0.0
         return TrackedObject(
             number=number,
             motion=motion,
@@ -233,7 +226,7 @@ class Tracker:
             z=state[states_of.Z],
             vx=vx,
             vy=vy,
-            pace=state[states_of.PACE] if moves else 0.0,
+            pace=state[states_of.PACE] if moves else pace,
             course=(state[states_of.COURSE_X], state[states_of.COURSE_Y]),
             radius=max(state[states_of.HALF_X], state[states_of.HALF_Y]),
             age=now - state[states_of.FIRST_SEEN],

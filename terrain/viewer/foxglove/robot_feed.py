@@ -14,7 +14,7 @@ from mbf_abstract.geometry import FloatArray, Twist
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.maps.tracking.contact import RobotBox
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 from mbf_abstract.maps.view import GridView, MeshView
 from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.session import NavigationSession

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.maps.tracking.contact import RobotBox
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.turning import points_on

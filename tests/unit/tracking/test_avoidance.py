@@ -11,9 +11,10 @@ from pydantic import ValidationError
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.tracking.avoidance import LOOK, AvoidanceParameters, MovingAround
-from mbf_abstract.maps.tracking.contact import SAME_STOREY, RobotBox
+from mbf_abstract.maps.tracking.contact import SAME_STOREY
 from mbf_abstract.maps.tracking.kernels.meeting import NOBODY
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 
 DISC, CARRIER = RobotBox.disc(0.3), RobotBox(-0.35, 0.45, -0.25, 0.2, 0.05)
 LIMITS = AvoidanceParameters(weight=10.0, horizon=2.0, margin=0.4)

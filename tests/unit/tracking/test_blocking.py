@@ -6,8 +6,8 @@ import pytest
 
 from mbf_abstract.geometry import Path
 from mbf_abstract.maps.tracking.blocking import blockages
-from mbf_abstract.maps.tracking.contact import RobotBox
 from mbf_abstract.maps.tracking.objects import MOST_REPORTS, Motion, MotionChanges, TrackedObject
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 
 DISC = RobotBox.disc(0.3)
 STRAIGHT = Path.from_points([(0.1 * step, 0.0, 0.0) for step in range(81)])

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.tracking.braking import Decelerations, motions_to_standstill
-from mbf_abstract.maps.tracking.contact import ContactParameters, RobotBox, safe_share
+from mbf_abstract.maps.tracking.contact import ContactParameters, safe_share
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 
 LIMITS = Decelerations(driving=0.5, turning=1.0, reaction_time=0.3)
 CARRIER = RobotBox(-0.35, 0.35, -0.25, 0.25, 0.0)

@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
-from mbf_abstract.maps.tracking.contact import SHARES, ContactParameters, RobotBox, safe_share
+from mbf_abstract.maps.tracking.contact import SHARES, ContactParameters, in_the_way, safe_share
 from mbf_abstract.maps.tracking.contact_guard import ContactGuard
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult
 
@@ -95,9 +96,42 @@ def test_a_robot_that_turns_off_or_backs_up_leaves_nobody_behind():
     assert share_of(AHEAD, behind(0.25, 0.6), pose=Pose.planar(0.0, 0.0, 1.5), limits=TURNING) == 0.0
 
 
-def test_what_stands_is_the_business_of_the_obstacle_layers():
-    for motion in (Motion.WAITING, Motion.PARKED):
-        assert share_of(AHEAD, moving(0.8, 0.0, motion=motion)) == 1.0
+def waiting(x, y, pace=0.15, motion=Motion.WAITING, z=0.0):
+    """Somebody who stands and may set off."""
+    return replace(moving(x, y, motion=motion, z=z), pace=pace)
+
+
+def test_what_stands_for_good_is_the_business_of_the_obstacle_layers():
+    assert share_of(AHEAD, waiting(0.8, 0.0, motion=Motion.PARKED)) == 1.0
+    assert share_of(AHEAD, waiting(0.8, 0.0, pace=0.0)) == 1.0, "as a tracker would that notices all motion"
+    assert share_of(AHEAD, waiting(0.8, 0.0, z=3.0)) == 1.0, "on another storey"
+
+
+def test_who_waits_is_passed_as_slowly_as_it_takes_to_stand_before_them():
+    found = [share_of(AHEAD, waiting(0.4, y)) for y in (0.56, 0.7, 0.74, 0.9)]
+    assert found == [0.5, 0.5, 0.75, 1.0], "never below the passing speed of 0.3 m/s"
+    assert share_of(AHEAD, waiting(0.4, 0.7), limits=LIMITS.model_copy(update={"passing_speed": 0.6})) == 1.0
+
+
+def test_a_slower_command_is_followed_beside_who_waits():
+    for command in (Twist.planar(0.3), Twist.planar(0.1, 0.0, 0.5), Twist.planar(wz=1.0)):
+        assert share_of(command, waiting(0.4, 0.56), box=CARRIER) == 1.0
+
+
+def test_a_robot_that_gets_away_from_who_waits_does_so_at_its_speed():
+    assert share_of(Twist.planar(-0.6), waiting(0.6, 0.0)) == 1.0
+    assert share_of(AHEAD, waiting(0.6, 0.0)) == 0.5
+
+
+def test_who_moves_stops_the_robot_beside_who_waits():
+    assert share_of(AHEAD, waiting(0.4, 0.56), moving(1.2, 0.0, -0.8)) == 0.0
+    share, touched = safe_share(DISC, HERE, AHEAD, AHEAD, [moving(1.3, 0.0, -0.2), waiting(0.4, 0.56)], LIMITS)
+    assert share == 0.5 and touched.motion is Motion.MOVING
+
+
+def test_who_waits_is_named():
+    _, touched = safe_share(DISC, HERE, AHEAD, AHEAD, [waiting(0.4, 0.56)], LIMITS)
+    assert in_the_way(touched) == "object 1 waits beside the way, at (0.40, 0.56)"
 
 
 def test_who_is_on_another_storey_does_not_count():
@@ -198,6 +232,25 @@ def test_with_the_share_that_is_safe_nobody_who_turns_is_touched_before_that_is_
         assert math.hypot(there[0] - driven, there[1]) > 0.3 + 0.25
         if pace == 0.0:
             return
+
+
+@given(st.floats(0.31, 1.0), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(0.01, 0.3), st.floats(-1.0, 1.0))
+@settings(max_examples=150, deadline=None)
+def test_above_the_passing_speed_nobody_who_sets_off_is_touched(v, x, y, pace, wz):
+    """The naive twin lets them come straight at the robot, which brakes in small steps."""
+    share = share_of(Twist.planar(v, 0.0, wz), waiting(x, y, pace), box=CARRIER)
+    assert share * v >= 0.3 - 1e-9
+    if share * v <= 0.3 + 1e-9:
+        return
+    px = py = yaw = time = 0.0
+    kept, dt, first = 1.0, 0.01, float(CARRIER.gaps(np.zeros((1, 3)), np.array([[[x, y]]]), np.array([0.25]))[0, 0])
+    while kept > 0.0:
+        px, py = px + kept * v * dt * math.cos(yaw), py + kept * v * dt * math.sin(yaw)
+        yaw, time = yaw + kept * wz * dt, time + dt
+        slowed = LIMITS.decel_lim_x / v * dt
+        kept = max(share if time <= LIMITS.reaction_time else 0.0, kept - slowed)
+        gap = float(CARRIER.gaps(np.array([[px, py, yaw]]), np.array([[[x, y]]]), np.array([0.25]))[0, 0])
+        assert gap > pace * time - 0.02 or gap > first - 0.02, f"share {share}: they reach it after {time:.2f} s"
 
 
 def test_the_same_question_has_the_same_answer():

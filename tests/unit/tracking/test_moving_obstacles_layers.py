@@ -179,6 +179,20 @@ def test_heights_count_only_on_maps_that_know_them(hall):
     assert (share < 1.0, around.anybody, bool(on_it)) == (hall.name == "costmap",) * 3
 
 
+def test_who_waits_is_passed_slowly_until_it_is_parked(hall):
+    """On both maps: it loads, and may set off."""
+    for _ in range(20):
+        hall.sees((4.0, 4.0))
+    pose, ahead = Pose.planar(3.4, 3.6), Twist.planar(0.6)
+    share, reason, _ = hall.map.safe_share(pose, ahead, ahead, hall.now)
+    assert share == 0.5 and "waits beside the way" in reason
+    assert hall.map.safe_share(Pose.planar(3.4, 2.8), ahead, ahead, hall.now)[0] == 1.0, "with more room"
+    parameters = hall.map.layers["moving"].parameters.model_copy(update={"parked_time": 1.0})
+    hall.map.set_layer_parameters("moving", parameters)
+    hall.sees((4.0, 4.0))
+    assert hall.map.safe_share(pose, ahead, ahead, hall.now)[0] == 1.0
+
+
 @pytest.mark.parametrize("inside", [True, False])
 def test_clearing_an_area_forgets_who_is_in_it(hall, inside):
     for step in range(15):

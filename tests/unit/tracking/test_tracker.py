@@ -230,10 +230,25 @@ def test_who_is_new_and_fast_moves_for_the_guard_before_it_has_come_far(speed, m
     assert guarded.vy == pytest.approx(-speed, abs=0.2)
 
 
-def test_who_has_been_seen_for_long_and_not_moved_stands_for_the_guard_too():
-    tracker, now = follow([(2.0, 0.0)] * 17 + [(2.0, -0.1), (2.0, -0.2)])
-    (guarded,) = tracker.objects(now, guarded=True)
-    assert guarded.motion is Motion.WAITING
+@pytest.mark.parametrize(
+    ("offsets", "motion"),
+    [((0.03, 0.08, 0.15), Motion.MOVING), ((0.1, 0.0, 0.1, 0.0), Motion.WAITING), ((0.01, 0.02, 0.03), Motion.WAITING)],
+)
+def test_who_has_been_seen_for_long_and_not_moved_moves_for_the_guard_once_it_sets_off(offsets, motion):
+    """A shelf that a wrong pose of the robot shifts to and fro, or that it sees more of, does not."""
+    tracker, now = follow([(2.0, 0.0)] * 25 + [(2.0, -offset) for offset in offsets])
+    (known,), (guarded,) = tracker.objects(now), tracker.objects(now, guarded=True)
+    assert known.motion is Motion.WAITING and guarded.motion is motion
+
+
+def test_who_waits_may_have_the_speed_that_does_not_show_and_who_is_parked_has_none():
+    p = TrackingParameters(parked_time=4.0)
+    for scans, pace in ((25, p.moving_distance / p.standing_time), (60, 0.0)):
+        tracker = Tracker(p, "map")
+        for step in range(scans):
+            tracker.insert(disc(2.0, 0.0), SENSOR, step * PERIOD)
+        (known,) = tracker.objects((scans - 1) * PERIOD)
+        assert known.pace == pace
 
 
 def test_who_has_moved_waits_and_goes_on_moves_for_the_guard_before_coming_far():
