@@ -86,9 +86,10 @@ def config(tmp_path):
     return str(file)
 
 
+@pytest.mark.timeout(300)  # the driver compiles its kernels on a machine that has none
 def test_the_driver_takes_a_base_to_its_goal_with_the_configuration_of_the_page(base, config):
     driver = [sys.executable, str(ROOT / "examples" / "udp_driver.py"), config, f"127.0.0.1:{base.port}", "1.0", "0.2"]
-    ended = subprocess.run(driver, capture_output=True, text=True, timeout=110)
+    ended = subprocess.run(driver, capture_output=True, text=True, timeout=250)
 
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert ended.stdout.startswith("SUCCESS")
