@@ -1,11 +1,13 @@
-"""Isolated points: errors of a sensor, insects, rain."""
+"""Clouds that are no map, and isolated points: errors of a sensor, insects, rain."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FloatArray
+from mbf_mesh_nav.mesh.mesh_report import MeshError
 
+LEAST_POINTS = 100
 FARTHEST_CELL = 2**20
 """Voxels along each axis; 60 bits number them all."""
 
@@ -31,3 +33,15 @@ def isolated_points(points: FloatArray, voxel: float, least: int) -> BoolArray:
         place = np.minimum(np.searchsorted(voxels, voxels + offset), len(voxels) - 1)
         around += np.where(voxels[place] == voxels + offset, counts[place], 0)
     return np.asarray((around < least)[voxel_of_point.ravel()])
+
+
+def refuse_degenerate(points: FloatArray) -> None:
+    """Refuse points (n, 3) that cannot be a map: too few, all in one place or on one line in the plan view."""
+    if len(points) < LEAST_POINTS:
+        raise MeshError("point cloud", [f"{len(points)} points are too few for a map, the least is {LEAST_POINTS}"])
+    x, y = points[:, 0] - points[:, 0].mean(), points[:, 1] - points[:, 1].mean()
+    xx, xy, yy = float((x * x).sum()), float((x * y).sum()), float((y * y).sum())
+    spread = 0.5 * (xx + yy)
+    across = spread - float(np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy))  # the smaller eigenvalue of the scatter matrix
+    if across <= 1e-6 * spread:
+        raise MeshError("point cloud", ["all of its points lie on one line in the plan view"])

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from pydantic import ValidationInfo, field_validator
 
 from mbf_abstract.geometry.arithmetic import tan
 from mbf_abstract.parameters import ParameterModel, parameter
@@ -15,7 +16,7 @@ from mbf_mesh_nav.building.decks import on_decks
 from mbf_mesh_nav.building.height_errors import height_errors
 from mbf_mesh_nav.building.heights import HeightLimits, fitted, noise_of_points, settled, smoothed, without_false_ground
 from mbf_mesh_nav.building.holes import without_holes
-from mbf_mesh_nav.building.outliers import isolated_points
+from mbf_mesh_nav.building.outliers import isolated_points, refuse_degenerate
 from mbf_mesh_nav.building.slabs import over_unseen_ground, without_undersides
 from mbf_mesh_nav.building.surface_patches import Grid, SurfacePatches
 from mbf_mesh_nav.kernels.building.columns import first_heights, sort_into_cells, split_columns
@@ -29,7 +30,6 @@ POINTS_PER_CELL = 4.0
 SMALLEST_CELL, LARGEST_CELL, CELL_STEP = 0.1, 1.0, 0.05
 """[m] What a tripod scans in the middle of a yard would do for cells of 5 cm: four times the vertices, less even."""
 STOREY = 2.5
-LEAST_POINTS = 100
 CROWN_UPWARD = 0.7071
 """Mean z of the unit normals below which a surface above ground is a crown."""
 Step = Callable[[str], None]
@@ -70,6 +70,15 @@ class SurfaceParameters(ParameterModel):
     decimation_bound: float = parameter(
         0.0, "Fewer vertices, whose faces stay this near to those of all; 0 = all vertices.", unit="m", ge=0.0, le=1.0
     )
+
+    @field_validator("step_height")
+    @classmethod
+    def _leaves_room_for_obstacles(cls, step_height: float, info: ValidationInfo) -> float:
+        """An obstacle is what stands between the height of a step and the clearance."""
+        clearance = info.data.get("clearance", CLEARANCE)
+        if step_height >= clearance:
+            raise ValueError(f"less than the clearance of {clearance:g} m, got {step_height:g}")
+        return step_height
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,18 +180,6 @@ def _hint_on_up(points: FloatArray) -> str:
     """What to try where points (n, 3) [m] seem to lie on their side; empty where they do not."""
     flattest = "xyz"[int(np.argmin(np.ptp(points, axis=0)))]
     return f"It is flattest along {flattest}: if that is up, choose --up {flattest}" if flattest != "z" else ""
-
-
-def refuse_degenerate(points: FloatArray) -> None:
-    """Refuse points (n, 3) that cannot be a map: too few, all in one place or on one line in the plan view."""
-    if len(points) < LEAST_POINTS:
-        raise MeshError("point cloud", [f"{len(points)} points are too few for a map, the least is {LEAST_POINTS}"])
-    x, y = points[:, 0] - points[:, 0].mean(), points[:, 1] - points[:, 1].mean()
-    xx, xy, yy = float((x * x).sum()), float((x * y).sum()), float((y * y).sum())
-    spread = 0.5 * (xx + yy)
-    across = spread - float(np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy))  # the smaller eigenvalue of the scatter matrix
-    if across <= 1e-6 * spread:
-        raise MeshError("point cloud", ["all of its points lie on one line in the plan view"])
 
 
 def cell_for(points: FloatArray) -> float:

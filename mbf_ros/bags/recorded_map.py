@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mbf_abstract.whole_files import write_whole
 from mbf_ros.bags.reading import Bag, BagError
-from mbf_ros.bags.recorded_time import check_seconds
+from mbf_ros.bags.recorded_time import check_end, check_seconds
 from mbf_ros.messages.floors import floor_of
 from mbf_ros.messages.geometry import NANOSECONDS, MessageContext
 from mbf_ros.messages.interfaces import Message, MessageError
@@ -54,9 +54,10 @@ def read_recorded_map(bag: Bag, topic: str, at: float) -> Message:
     BagError
         There is none, or its bytes are none of its type.
     ValueError
-        ``at`` is negative or NaN.
+        ``at`` is negative, NaN or after the end of the bag.
     """
     check_seconds("--at", at)
+    check_end("--at", at, bag)
     bag.require(topic)
     last = None
     for recorded in bag.messages():

@@ -8,6 +8,7 @@ Simulated time passes in steps of a tenth of a second, so a recording whose own 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from datetime import datetime, timezone
 from itertools import islice
@@ -113,6 +114,13 @@ def check_seconds(option: str, seconds: float) -> None:
     """Raise ValueError for an option in seconds that is negative or NaN."""
     if not seconds >= 0.0:
         raise ValueError(f"{option}: expected 0 s or more, got {seconds}")
+
+
+def check_end(option: str, seconds: float, bag: Bag) -> None:
+    """Raise ValueError for an option in seconds from the beginning of a bag that is after its end and finite."""
+    duration = (bag.end - bag.start) / NANOSECONDS
+    if duration < seconds < math.inf:
+        raise ValueError(f"{option}: expected at most {duration:.3f} s, where the bag ends, got {seconds:g} s")
 
 
 def first_stamp(message: Message) -> dict[str, Any] | None:

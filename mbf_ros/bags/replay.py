@@ -24,7 +24,7 @@ from mbf_ros.bags.inputs import BagInputs, RecordedRobot
 from mbf_ros.bags.observation import Observation
 from mbf_ros.bags.planning import ReplayedPlan
 from mbf_ros.bags.reading import Bag
-from mbf_ros.bags.recorded_time import RecordedTime, steady_messages
+from mbf_ros.bags.recorded_time import RecordedTime, check_end, steady_messages
 from mbf_ros.bags.replay_options import ReplayOptions
 from mbf_ros.bags.statistics import FrameStatistics, TopicStatistics
 from mbf_ros.bags.topics import check_transforms, choose_topics
@@ -85,9 +85,12 @@ def replay_bag(
     """
     if not issubclass(server_class, MapServer):
         raise ValueError(f"the backend {config.backend!r} has no maps that sensors feed")
+    check_end("--at", options.at, bag)
     with NavigationSession() as session:
         robot, transforms = RecordedRobot(), TransformBuffer(config.parameters.tf_cache_time)
         server = session.serve(server_class, config, robot, transforms)
+        if options.goal is not None and (problem := server.plugins.problem(PluginKind.PLANNER, options.planner)):
+            raise ValueError(f"--planner: {problem}")
         for transform in options.transforms:
             transforms.set(transform)
         maps = RobotInputs(session.clock.now, lambda: MessageContext(config.parameters.global_frame)).of_maps(server)
@@ -123,8 +126,6 @@ class _Player:
         self._plan = None
         if options.goal is not None:
             self._plan = ReplayedPlan(session.navigator, options.goal, options.planner, observation.frame_id)
-        if options.at > time.duration and math.isfinite(options.at):
-            raise ValueError(f"--at: expected at most {time.duration:.3f} s, where the bag ends, got {options.at:g} s")
         self._plan_at = time.began + options.at
         self._every = options.every or max(time.duration / PICTURES, SAMPLE_PERIOD)
         count = math.ceil(time.duration / self._every) + 1

@@ -151,6 +151,7 @@ def test_types_that_nobody_knows_matter_only_where_they_are_used(tmp_path, repla
     [
         ({"goal": Place(1.0, 0.0), "at": 9.0}, "--at: expected at most 0.100 s, where the bag ends, got 9 s"),
         ({"goal": Place(1.0, 0.0), "at": float("nan")}, "--at: expected 0 s or more, got nan"),
+        ({"goal": Place(1.0, 0.0), "planner": "typo"}, "--planner: no planner named 'typo'; loaded: straight"),
         ({"every": float("nan")}, "--every: expected 0 s or more, got nan"),
         ({"every": 0.0001}, "expected at most 200 pictures, got 1002"),
         ({"map_name": "attic"}, "--map: expected one of global_costmap, local_costmap"),

@@ -73,8 +73,8 @@ def test_a_topic_without_a_map_says_so(tmp_path):
     with open_bag(tmp_path / "drive") as bag:
         with pytest.raises(BagError, match=r"expected a map on /map, got none$"):
             read_recorded_map(bag, "/map", math.inf)
-        with pytest.raises(BagError, match=r"expected a map on /map in the first 3 s, got none$"):
-            read_recorded_map(bag, "/map", 3.0)
+        with pytest.raises(BagError, match=r"expected a map on /map in the first 0 s, got none$"):
+            read_recorded_map(bag, "/map", 0.0)
 
 
 def test_a_time_that_is_no_number_is_refused(tmp_path):
@@ -83,6 +83,13 @@ def test_a_time_that_is_no_number_is_refused(tmp_path):
         pytest.raises(ValueError, match="--at: expected 0 s or more, got nan"),
     ):
         read_recorded_map(bag, "/map", math.nan)
+
+
+def test_a_time_after_the_end_of_the_bag_is_refused(tmp_path):
+    bag = make_bag(tmp_path, [grid(0.0, CELLS), *drive(0.5)[-1:]])
+    refused = run(bag, "--out", tmp_path / "map.yaml", "--at", "9")
+    assert refused.exit_code == 2 and not (tmp_path / "map.yaml").exists()
+    assert "error: --at: expected at most 0.500 s, where the bag ends, got 9 s" in refused.output
 
 
 def test_of_several_maps_the_one_named_map_is_taken_or_asked_for(tmp_path):

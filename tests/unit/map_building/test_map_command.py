@@ -177,6 +177,11 @@ def test_a_package_that_decimation_needs_is_asked_for_before_a_file_is_read(tmp_
     [
         (["--up", "w"], "expected x, y or z, got 'w'"),
         (["--step-height", "-1"], "Invalid value for --step-height: expected a number >= 0.02 and <= 2 m, got -1.0"),
+        (
+            ["--step-height", "1", "--clearance", "0.9"],
+            "Invalid value for --step-height: expected less than the clearance of 0.9 m, got 1",
+        ),
+        (["--clearance", "0.2"], "Invalid value for --step-height: expected less than the clearance of 0.2 m, got 0.2"),
         (["--decimate", "5"], "Invalid value for --decimate: expected a number >= 0 and <= 1 m, got 5.0"),
         (["--scale", "inf"], "Invalid value for --scale: expected a finite length, got inf"),
         (["--from-run", "nowhere"], "error: nowhere: there is no such folder"),
