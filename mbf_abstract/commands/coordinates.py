@@ -63,6 +63,10 @@ def parse_place(text: str, option: str) -> Place:
     numbers = [float(part) for part in parts]
     if not all(math.isfinite(number) for number in numbers):
         raise typer.BadParameter(f"coordinates must be finite, got {text!r}", param_hint=option)
+    from mbf_abstract.geometry import FARTHEST_COORDINATE  # with NumPy, which --help can do without
+
+    if max(map(abs, numbers)) > FARTHEST_COORDINATE:
+        raise typer.BadParameter(f"coordinates must be within {FARTHEST_COORDINATE:g}, got {text!r}", param_hint=option)
     return Place(*numbers)
 
 

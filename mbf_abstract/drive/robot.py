@@ -25,6 +25,9 @@ TRACK_SPACING = 0.05
 """Least distance [m] between two points of the driven track."""
 TRACK_POINTS = 200
 """Length of the track: ten metres of a slow robot."""
+FASTEST = 200.0
+"""Largest component of a measured velocity [m/s, rad/s]; no robot on the ground is faster, and controllers think ahead
+by it."""
 
 
 class RobotStateError(Exception):
@@ -48,11 +51,16 @@ def odometry_problem(answer: object) -> str:
     velocity: object = answer.velocity
     if not isinstance(velocity, Twist):
         return f"the driver's Odometry holds {type(velocity).__name__}, expected Twist"
+    numbers = (*velocity.linear, *velocity.angular)
     try:
-        finite = all(math.isfinite(number) for number in (*velocity.linear, *velocity.angular, answer.stamp))
+        finite = all(math.isfinite(number) for number in (*numbers, answer.stamp))
     except TypeError:
         finite = False
-    return "" if finite else f"the driver's Odometry is not finite: {velocity} at {answer.stamp} s"
+    if not finite:
+        return f"the driver's Odometry is not finite: {velocity} at {answer.stamp} s"
+    if max(map(abs, numbers)) > FASTEST:
+        return f"the driver's Odometry is faster than {FASTEST:g} m/s or rad/s: {velocity}"
+    return ""
 
 
 class Robot(Protocol):

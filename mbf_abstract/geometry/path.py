@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbf_abstract.geometry.arithmetic import arctan2, norm, scalar_products
+from mbf_abstract.geometry.coordinates import FARTHEST_COORDINATE, NonFiniteError, coordinates
 from mbf_abstract.geometry.pose import Pose
 from mbf_abstract.geometry.rotations import (
     QUATERNION_NORM_TOLERANCE,
     FloatArray,
-    NonFiniteError,
     Quaternion,
     level_quaternions,
     quaternions_from_axes,
@@ -22,13 +22,14 @@ from mbf_abstract.geometry.rotations import (
 
 
 def _refuse_wrong_pose(positions: FloatArray, orientations: FloatArray, squared_norms: FloatArray) -> None:
-    """Name the first pose of a path that is not finite, or else the first whose quaternion is not of unit length."""
+    """Name the first pose of a path that is not finite, too far away, or whose quaternion is not of unit length."""
     infinite = ~np.isfinite(positions).all(axis=1)
     if not infinite.any():  # else it has made the headings of its neighbours what they are
         infinite = ~np.isfinite(orientations).all(axis=1)
     if infinite.any():
         i = int(np.argmax(infinite))
         raise NonFiniteError(f"pose {i} of the path is not finite: {positions[i].tolist()} {orientations[i].tolist()}")
+    _refuse_far(positions)
     i = int(np.argmax(np.abs(squared_norms - 1.0) > QUATERNION_NORM_TOLERANCE))
     raise ValueError(f"orientation of pose {i} has squared norm {squared_norms[i]:.6g}, expected 1")
 
@@ -38,6 +39,14 @@ def _refuse_infinite(points: FloatArray, what: str) -> None:
     if not np.isfinite(points).all():
         i = int(np.argmax(~np.isfinite(points).all(axis=1)))
         raise NonFiniteError(f"{what} {i} of the path is not finite: {points[i].tolist()}")
+
+
+def _refuse_far(positions: FloatArray) -> None:
+    """Name the first of finite positions (n, 3) whose coordinates are beyond the bound."""
+    far = (np.abs(positions) > FARTHEST_COORDINATE).any(axis=1)
+    if far.any():
+        i = int(np.argmax(far))
+        coordinates(f"position of pose {i} of the path", positions[i].tolist())
 
 
 def _rows(values: ArrayLike, columns: int, what: str) -> FloatArray:
@@ -71,7 +80,8 @@ class Path:
     Raises
     ------
     ValueError
-        Wrong shapes, a non-finite number (named by index) or a quaternion that is not of unit length.
+        Wrong shapes, a non-finite number or a coordinate beyond ``FARTHEST_COORDINATE`` (named by index), or a
+        quaternion that is not of unit length.
     """
 
     positions: FloatArray
@@ -91,7 +101,7 @@ class Path:
         # Whole arrays first: which pose is wrong is looked for only if one may be.
         norms = scalar_products(orientations, orientations)
         is_unit = np.abs(norms - 1.0) <= QUATERNION_NORM_TOLERANCE
-        if not (is_unit.all() and np.isfinite(positions).all()):
+        if not (is_unit.all() and np.abs(positions).max(initial=0.0) <= FARTHEST_COORDINATE):
             _refuse_wrong_pose(positions, orientations, norms)
         positions.flags.writeable = False
         orientations.flags.writeable = False
@@ -149,6 +159,7 @@ class Path:
         """
         points = _rows(positions, 3, "positions")
         _refuse_infinite(points, "pose")
+        _refuse_far(points)
         if normals is not None:
             if np.shape(normals) != points.shape:
                 raise ValueError(f"the normals of a path have the shape {np.shape(normals)}, expected {points.shape}")

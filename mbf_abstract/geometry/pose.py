@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from mbf_abstract.geometry.coordinates import coordinates, finite
 from mbf_abstract.geometry.rotations import (
     QUATERNION_NORM_TOLERANCE,
     FloatArray,
     Quaternion,
     Vector3,
-    finite,
     quaternion_from_yaw,
     rotation_matrix,
     yaw_from_quaternion,
@@ -24,7 +24,8 @@ class Pose:
     Raises
     ------
     ValueError
-        A component is not finite, or the squared norm of the quaternion is off 1 by more than 0.01.
+        A component is not finite, a coordinate is beyond ``FARTHEST_COORDINATE`` (1e9 m), or the squared norm of the
+        quaternion is off 1 by more than 0.01.
     """
 
     position: Vector3
@@ -33,7 +34,7 @@ class Pose:
     stamp: float = 0.0
 
     def __post_init__(self) -> None:
-        position = finite("position", self.position)
+        position = coordinates("position", self.position)
         orientation = finite("orientation", self.orientation)
         if len(position) != 3 or len(orientation) != 4:
             raise ValueError("a pose has a position of 3 and an orientation of 4 components")

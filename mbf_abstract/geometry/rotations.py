@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,10 +15,6 @@ Quaternion = tuple[float, float, float, float]
 FloatArray = NDArray[np.float64]
 
 QUATERNION_NORM_TOLERANCE = 0.01
-
-
-class NonFiniteError(ValueError):
-    """A number that must be finite is NaN or infinite; the text names the field or index."""
 
 
 def quaternion_from_yaw(yaw: float) -> Quaternion:
@@ -129,12 +125,3 @@ def _quaternions_from_matrices(m: FloatArray) -> FloatArray:
     q[pick, 2] = mm[..., 1, 0] - mm[..., 0, 1]
     q[pick, 3] = 1 + trace[pick]
     return np.asarray(q / norm(q)[..., None], dtype=float)
-
-
-def finite(name: str, values: Iterable[float]) -> tuple[float, ...]:
-    """Return the values as floats; raise ``NonFiniteError`` naming the first that is NaN or infinite."""
-    numbers = tuple(map(float, values))
-    if not all(map(math.isfinite, numbers)):
-        index = [math.isfinite(value) for value in numbers].index(False)
-        raise NonFiniteError(f"{name}[{index}] must be finite, got {numbers[index]}")
-    return numbers

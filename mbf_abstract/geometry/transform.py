@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbf_abstract.geometry import (
+    FARTHEST_COORDINATE,
     QUATERNION_NORM_TOLERANCE,
     FloatArray,
     Path,
@@ -56,8 +57,8 @@ class Transform:
     Raises
     ------
     InvalidTransformError
-        A number is not finite, the squared norm of the rotation is off 1 by 0.01 or more, or a frame name is empty
-        or starts with ``/``.
+        A number is not finite, the translation is beyond ``FARTHEST_COORDINATE`` (1e9 m), the squared norm of the
+        rotation is off 1 by 0.01 or more, or a frame name is empty or starts with ``/``.
     """
 
     translation: Vector3
@@ -75,6 +76,8 @@ class Transform:
             raise self._invalid(f"needs 3 and 4 numbers, got {translation} and {rotation}")
         if not all(map(math.isfinite, (*translation, *rotation, self.stamp))):
             raise self._invalid(f"not finite: {translation} {rotation} at {self.stamp}")
+        if max(map(abs, translation)) > FARTHEST_COORDINATE:
+            raise self._invalid(f"expected a translation within {FARTHEST_COORDINATE:g} m of zero, got {translation}")
         x, y, z, w = rotation
         norm_squared = x * x + y * y + z * z + w * w
         if abs(norm_squared - 1.0) >= QUATERNION_NORM_TOLERANCE:
@@ -113,14 +116,29 @@ class Transform:
         return rotated(rotation_matrix(self.rotation), points) + self.translation
 
     def apply_to_pose(self, pose: Pose) -> Pose:
-        """Map a pose from the child frame to the parent frame; it keeps its stamp."""
+        """Map a pose from the child frame to the parent frame; it keeps its stamp.
+
+        Raises
+        ------
+        InvalidTransformError
+            There it is beyond ``FARTHEST_COORDINATE``.
+        """
         position = _add(self.translation, rotate(self.rotation, pose.position))
-        return Pose(position, quaternion_multiply(self.rotation, pose.orientation), self.parent, pose.stamp)
+        try:
+            return Pose(position, quaternion_multiply(self.rotation, pose.orientation), self.parent, pose.stamp)
+        except ValueError as error:
+            raise self._invalid(str(error)) from error
 
     def apply_to_path(self, path: Path) -> Path:
-        """Map a path from the child frame to the parent frame; its guidance, which cannot be mapped, is dropped."""
+        """Map a path from the child frame to the parent frame; its guidance, which cannot be mapped, is dropped.
+
+        Raises InvalidTransformError as ``apply_to_pose`` does.
+        """
         orientations = _multiply_many(self.rotation, np.asarray(path.orientations))
-        return Path(self.apply(path.positions), orientations, self.parent, path.stamp)
+        try:
+            return Path(self.apply(path.positions), orientations, self.parent, path.stamp)
+        except ValueError as error:
+            raise self._invalid(str(error)) from error
 
     def interpolate(self, later: Transform, stamp: float) -> Transform:
         """Return the transform at ``stamp`` between this one and a later one: linear, and slerp for the rotation."""

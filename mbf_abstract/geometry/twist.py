@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from mbf_abstract.geometry.rotations import Vector3, finite
+from mbf_abstract.geometry.coordinates import finite
+from mbf_abstract.geometry.rotations import Vector3
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mbf_abstract.geometry import FARTHEST_COORDINATE
 
 OCCUPIED, UNKNOWN_OCCUPANCY = 100, 255
 """Occupancies of cells: occupied from the first value on, unknown at the second."""
@@ -67,8 +68,9 @@ class FloorMap:
             limits = f"{LEAST_RESOLUTION:g} to {GREATEST_RESOLUTION:g} m"
             raise ValueError(f"FloorMap.resolution: expected {limits}, got {self.resolution}")
         for name, value in (("origin_x", self.origin_x), ("origin_y", self.origin_y), ("yaw", self.yaw)):
-            if not math.isfinite(value):
-                raise ValueError(f"FloorMap.{name}: expected a finite number, got {value}")
+            if not abs(value) <= FARTHEST_COORDINATE:  # or nan
+                limits = f"a number within {FARTHEST_COORDINATE:g} of zero"
+                raise ValueError(f"FloorMap.{name}: expected {limits}, got {value}")
 
     def equals(self, other: FloorMap) -> bool:
         """Whether the other map says the same of the same place."""

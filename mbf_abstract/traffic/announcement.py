@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry import FARTHEST_COORDINATE, FloatArray
 from mbf_abstract.geometry.arithmetic import norm
 
 SPACING = 0.1
 """Distance [m] of the points at which two paths are compared."""
+LONGEST_PATH = 1e5
+"""Longest path [m] that is taken from others: it becomes points ``SPACING`` apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,13 +81,19 @@ class Announcement:
             )
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise ValueError(f"no announcement of a robot: {type(error).__name__}: {error}") from error
-        numbers = np.array([read.stamp, read.remaining, read.radius, read.distance, *path.ravel()])
-        if not (read.name and len(path) and np.isfinite(numbers).all() and min(read.radius, read.distance) >= 0.0):
+        numbers = np.array([read.stamp, read.remaining, read.radius, read.distance])
+        is_near = len(path) > 0 and bool((np.abs(path) <= FARTHEST_COORDINATE).all()) and read.length <= LONGEST_PATH
+        if not (read.name and is_near and np.isfinite(numbers).all() and min(read.radius, read.distance) >= 0.0):
             raise ValueError(
-                "no announcement of a robot: it needs a name, a place and finite numbers, "
-                "the radius and the distance not below 0"
+                "no announcement of a robot: it needs a name, a place and finite numbers, the radius and the distance "
+                f"not below 0, a path within {FARTHEST_COORDINATE:g} m of zero and of at most {LONGEST_PATH:g} m"
             )
         return read
+
+    @property
+    def length(self) -> float:
+        """Of ``path`` [m]."""
+        return float(norm(np.diff(self.path, axis=0)).sum())
 
     def points_ahead(self, length: float) -> FloatArray:
         """Points (n, 3) [m] of its path from where it is up to ``length`` [m], ``SPACING`` apart."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.config.validation import findings_of
 from mbf_abstract.config.yaml_source import YamlDocument, load_yaml
+from mbf_abstract.geometry import FARTHEST_COORDINATE
 from mbf_abstract.parameters import parameter
 
 OccupancyArray = NDArray[np.uint8]
+Near = Annotated[float, Field(ge=-FARTHEST_COORDINATE, le=FARTHEST_COORDINATE)]
 
 FREE_OCCUPANCY = 0
 OCCUPIED = 100
@@ -60,7 +63,7 @@ class MapDescription(BaseModel):
 
     image: str = Field(min_length=1)
     resolution: float = parameter(..., "Edge of a cell.", unit="m", ge=1e-4, le=1e3)
-    origin: tuple[float, float, float]
+    origin: tuple[Near, Near, Near]
     negate: bool = False
     occupied_thresh: float = Field(0.65, ge=0.0, le=1.0)
     free_thresh: float = Field(0.196, ge=0.0, le=1.0)

@@ -22,6 +22,7 @@ from typing import cast
 
 from pydantic import field_validator, model_validator
 
+from mbf_abstract.geometry import FARTHEST_COORDINATE
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.layers.layer_list import LayerBlocks, LayerEntry, layer_loader, made_layer, plan_layers
 from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE
@@ -44,8 +45,22 @@ class CostmapParameters(ParameterModel):
     width: float = parameter(10.0, "Extent along x; a static map replaces it.", unit="m", gt=0.0, dynamic=False)
     height: float = parameter(10.0, "Extent along y; a static map replaces it.", unit="m", gt=0.0, dynamic=False)
     resolution: float = parameter(0.1, "Side of a cell.", unit="m", ge=1e-4, le=1e3, dynamic=False)
-    origin_x: float = parameter(0.0, "X of the lower-left corner.", unit="m", dynamic=False)
-    origin_y: float = parameter(0.0, "Y of the lower-left corner.", unit="m", dynamic=False)
+    origin_x: float = parameter(
+        0.0,
+        "X of the lower-left corner.",
+        unit="m",
+        ge=-FARTHEST_COORDINATE,
+        le=FARTHEST_COORDINATE,
+        dynamic=False,
+    )
+    origin_y: float = parameter(
+        0.0,
+        "Y of the lower-left corner.",
+        unit="m",
+        ge=-FARTHEST_COORDINATE,
+        le=FARTHEST_COORDINATE,
+        dynamic=False,
+    )
     robot_radius: float = parameter(0.46, "Radius of a round robot; a footprint replaces it.", unit="m", ge=0.0, le=1e6)
     footprint: str | list[tuple[float, float]] | None = parameter(
         None, "Corners of the robot, [[x, y], ...] or the same as text.", unit="m"

@@ -5,8 +5,7 @@ their neighbours are flipped without being listed, if all can agree. The report 
 counts and indices in the caller's numbering. The caller's arrays and files are never changed.
 
 ``REPAIRS`` maps each defect that can be repaired to what the repair does. Harmless findings (unreferenced vertices,
-vertices of holes, several components, a component that faces down, groups of faces that touch in a point) never
-refuse a mesh.
+vertices of holes, several components, one that faces down, groups of faces that touch in a point) never refuse a mesh.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbf_abstract.geometry import FARTHEST_COORDINATE
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.defects import (
     face_shapes,
@@ -34,7 +34,7 @@ from mbf_mesh_nav.mesh.topology import group_of_each
 from mbf_mesh_nav.mesh.welding import join_boundaries, rounding_distance, same_position
 
 REPAIRS: dict[str, str] = {
-    "non_finite": "drop vertices with NaN or inf and their faces",
+    "non_finite": "drop vertices with NaN, inf or coordinates beyond 1e9 m, and their faces",
     "index_out_of_range": "drop faces that name a vertex that does not exist",
     "duplicate_vertices": "merge vertices at the same position, at the boundaries of parts also those nearly there",
     "zero_area": "flip faces without area away and join their neighbours; drop those that cannot be",
@@ -139,12 +139,12 @@ class _Check:
         self.found("index_out_of_range", text, np.flatnonzero(outside))
         kept = np.flatnonzero(~outside)
         mesh = CheckedMesh(points, corners[kept].astype(np.int32), identity, kept.astype(np.int32), identity)
-        broken = np.asarray(~np.isfinite(points).all(axis=1))
+        broken = np.asarray(~(np.abs(points) <= FARTHEST_COORDINATE).all(axis=1))  # not those with NaN either
         if not broken.any():
             return mesh
-        # A grid with voids has a vertex without a height for each of them; vertices that no face names do no harm.
-        used = mesh.used
-        self.found("non_finite", "{count} vertices have a NaN or inf coordinate", np.flatnonzero(broken & used))
+        used = mesh.used  # the others do no harm: a grid with voids has a vertex without a height for each of them
+        text = "{count} vertices have a coordinate that is NaN, inf or beyond 1e+09 m"
+        self.found("non_finite", text, np.flatnonzero(broken & used))
         text = "{count} vertices without a position belong to no face and are left out"
         self.found("holes", text, np.flatnonzero(broken & ~used), harmless=True)
         return mesh.without_faces(np.asarray(broken[mesh.faces].any(axis=1))).without_vertices(broken)

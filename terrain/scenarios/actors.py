@@ -21,12 +21,12 @@ from terrain.physics.people import Person
 from terrain.physics.robot_models import ROBOTS
 from terrain.scenarios.obstacles import Size
 from terrain.scenarios.perturbation import DrawnError
-from terrain.scenarios.places import Interval, PlanarPose, off_the_ground
+from terrain.scenarios.places import Coordinate, Interval, PlanarPose, off_the_ground
 from terrain.scenarios.world import ScenarioWorld
 from terrain.worlds.occupancy import OccupancyGrid
 from terrain.worlds.wall_clearance import Walls
 
-Route = Annotated[tuple[tuple[float, float], ...], Field(min_length=1)]
+Route = Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(min_length=1)]
 
 MAX_ROUTE_DRAWS = 10_000
 LONGEST_LEG = 12.0  # m; short legs of a drawn route are found sooner

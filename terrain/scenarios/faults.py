@@ -16,7 +16,7 @@ from mbf_abstract.geometry.arithmetic import rotated, rotated_back
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.physics.actors import AnyWorld
-from terrain.scenarios.places import FULL_TURN
+from terrain.scenarios.places import FULL_TURN, Offset
 from terrain.sensors.proprioception import Localization
 from terrain.sensors.sensor import Sensor
 
@@ -46,8 +46,8 @@ class LocalizationJump(TimedFault):
     """The localisation is off by a fixed amount; scans end up in the wrong place with it."""
 
     type: Literal["jump"]
-    dx: float = parameter(0.0, "Error along x.", unit="m")
-    dy: float = parameter(0.0, "Error along y.", unit="m")
+    dx: Offset = parameter(0.0, "Error along x.", unit="m")
+    dy: Offset = parameter(0.0, "Error along y.", unit="m")
     dyaw: float = parameter(0.0, "Error of the heading.", unit="rad", ge=-FULL_TURN, le=FULL_TURN)
 
 

@@ -9,10 +9,11 @@ from pydantic import Field, model_validator
 
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.parameters import ParameterModel, parameter
+from terrain.scenarios.places import Coordinate, Offset
 from terrain.worlds.generate import add_boulders, add_crater, add_ridge, add_road, add_ruts, add_steps
 from terrain.worlds.heightfield import Heightfield
 
-PlanarLine = Annotated[tuple[tuple[float, float], ...], Field(min_length=2)]
+PlanarLine = Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(min_length=2)]
 
 
 class Ridge(ParameterModel):
@@ -20,7 +21,7 @@ class Ridge(ParameterModel):
 
     type: Literal["ridge"]
     points: PlanarLine = parameter(..., "Corners of its crest.", unit="m")
-    height: float = parameter(..., "Of the crest above the ground; below 0 it is a trench.", unit="m")
+    height: Offset = parameter(..., "Of the crest above the ground; below 0 it is a trench.", unit="m")
     width: float = parameter(..., "From foot to foot.", unit="m", gt=0.0, le=10_000.0)
 
 
@@ -28,11 +29,11 @@ class Crater(ParameterModel):
     """A bowl with a raised rim."""
 
     type: Literal["crater"]
-    x: float = parameter(..., "Position of its middle.", unit="m")
-    y: float = parameter(..., "Position of its middle.", unit="m")
+    x: Coordinate = parameter(..., "Position of its middle.", unit="m")
+    y: Coordinate = parameter(..., "Position of its middle.", unit="m")
     radius: float = parameter(..., "From the middle to the crest of the rim.", unit="m", gt=0.0, le=10_000.0)
     depth: float = parameter(..., "Of the bowl below the ground.", unit="m", gt=0.0, le=10_000.0)
-    rim: float | None = parameter(None, "Of the crest above the ground; absent = a fifth of the depth.", unit="m")
+    rim: Offset | None = parameter(None, "Of the crest above the ground; absent = a fifth of the depth.", unit="m")
 
 
 class Ruts(ParameterModel):
@@ -49,7 +50,7 @@ class Road(ParameterModel):
     """A road that is level across; hairpins make a switchback."""
 
     type: Literal["road"]
-    points: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=2)] = parameter(
+    points: Annotated[tuple[tuple[Coordinate, Coordinate, Offset], ...], Field(min_length=2)] = parameter(
         ..., "Corners of its middle with heights.", unit="m"
     )
     width: float = parameter(3.0, "Of the level part.", unit="m", gt=0.0, le=10_000.0)
@@ -76,7 +77,7 @@ class Steps(ParameterModel):
     """Stairs that rise along +x over the whole width of the world."""
 
     type: Literal["steps"]
-    x: float = parameter(..., "Where the first step rises.", unit="m")
+    x: Coordinate = parameter(..., "Where the first step rises.", unit="m")
     height: float = parameter(0.15, "Of a step.", unit="m", gt=0.0, le=10_000.0)
     length: float = parameter(1.0, "Of a step.", unit="m", gt=0.0, le=10_000.0)
     count: int = parameter(1, "Number of steps.", ge=1, le=1000)

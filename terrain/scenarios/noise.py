@@ -12,6 +12,7 @@ from scipy import ndimage
 
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.parameters import ParameterModel, parameter
+from terrain.scenarios.places import FARTHEST
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid
 
@@ -19,25 +20,26 @@ from terrain.worlds.occupancy import OccupancyGrid
 class LocalizationNoise(ParameterModel):
     """White noise of each pose that the localisation gives, 60 poses a second; standard deviations."""
 
-    position_noise: float = parameter(0.0, "Error along x, and along y.", unit="m", ge=0.0)
-    height_noise: float = parameter(0.0, "Error of the height.", unit="m", ge=0.0)
+    position_noise: float = parameter(0.0, "Error along x, and along y.", unit="m", ge=0.0, le=FARTHEST)
+    height_noise: float = parameter(0.0, "Error of the height.", unit="m", ge=0.0, le=FARTHEST)
     yaw_noise: float = parameter(0.0, "Error of the heading.", unit="deg", ge=0.0, lt=180.0)
     tilt_noise: float = parameter(0.0, "Error of roll, and of pitch.", unit="deg", ge=0.0, lt=45.0)
 
     def widened(self, position: float, angle: float) -> LocalizationNoise:
         """Return the noise with independent errors of x, y and z [m] and of all three angles [deg] added."""
-        return LocalizationNoise(
-            position_noise=math.hypot(self.position_noise, position),
-            height_noise=math.hypot(self.height_noise, position),
-            yaw_noise=math.hypot(self.yaw_noise, angle),
-            tilt_noise=math.hypot(self.tilt_noise, angle),
-        )
+        errors = {
+            "position_noise": math.hypot(self.position_noise, position),
+            "height_noise": math.hypot(self.height_noise, position),
+            "yaw_noise": math.hypot(self.yaw_noise, angle),
+            "tilt_noise": math.hypot(self.tilt_noise, angle),
+        }
+        return self.model_copy(update=errors)  # may be more than one of them may be
 
 
 class MapNoise(ParameterModel):
     """Errors of the map that the navigation gets; the world itself does not change."""
 
-    height_noise: float = parameter(0.0, "Standard deviation of each vertex's height.", unit="m", ge=0.0)
+    height_noise: float = parameter(0.0, "Standard deviation of each vertex's height.", unit="m", ge=0.0, le=FARTHEST)
     spacing: float | None = parameter(
         None, "Distance of the samples of open ground on the map; absent = the world's own.", unit="m", gt=0.01
     )

@@ -12,7 +12,7 @@ from pydantic import Field
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.physics.actors import AnyWorld
-from terrain.scenarios.places import FULL_TURN, Interval, off_the_ground
+from terrain.scenarios.places import FULL_TURN, Coordinate, Interval, off_the_ground
 from terrain.worlds.surface import Surface, box, cylinder, joined
 
 DRAWS_PER_POST = 100
@@ -26,8 +26,8 @@ class Obstacle(ParameterModel):
     """Something that stands in the world but on no map."""
 
     shape: Literal["box", "cylinder"] = parameter("box", "Its form.")
-    x: float = parameter(..., "Position of its middle.", unit="m")
-    y: float = parameter(..., "Position of its middle.", unit="m")
+    x: Coordinate = parameter(..., "Position of its middle.", unit="m")
+    y: Coordinate = parameter(..., "Position of its middle.", unit="m")
     yaw: float = parameter(0.0, "Heading.", unit="rad", ge=-FULL_TURN, le=FULL_TURN)
     size: Size = parameter((0.5, 0.5, 1.0), "Length, width, height; a cylinder's diameter.", unit="m")
 

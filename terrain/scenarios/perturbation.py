@@ -15,7 +15,7 @@ import numpy as np
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import ParameterModel, parameter
-from terrain.scenarios.places import Place, PlanarPose
+from terrain.scenarios.places import FARTHEST, Place, PlanarPose
 
 PERTURBATION_STREAM = 5  # of the run's seed; 1 to 4 belong to the world
 
@@ -27,7 +27,9 @@ class DrawnError(ConfigError):
 class Perturbation(ParameterModel):
     """What may differ from the scenario as written; zero everywhere = nothing."""
 
-    start_position: float = parameter(0.0, "Largest shift of the start along x, and along y; drawn.", unit="m", ge=0.0)
+    start_position: float = parameter(
+        0.0, "Largest shift of the start along x, and along y; drawn.", unit="m", ge=0.0, le=FARTHEST
+    )
     start_yaw: float = parameter(0.0, "Largest turn of the start; drawn.", unit="deg", ge=0.0, le=180.0)
     friction: float = parameter(
         0.0, "Largest relative change of the friction of the wheels; drawn, without effect without physics.", ge=0, lt=1
@@ -35,8 +37,12 @@ class Perturbation(ParameterModel):
     mass: float = parameter(
         0.0, "Largest relative change of the robot's mass; drawn, without effect without physics.", ge=0.0, lt=1.0
     )
-    range_noise: float = parameter(0.0, "Standard deviation added to every range of a lidar.", unit="m", ge=0.0)
-    pose_position: float = parameter(0.0, "Standard deviation added to x, y and z of the pose.", unit="m", ge=0.0)
+    range_noise: float = parameter(
+        0.0, "Standard deviation added to every range of a lidar.", unit="m", ge=0.0, le=FARTHEST
+    )
+    pose_position: float = parameter(
+        0.0, "Standard deviation added to x, y and z of the pose.", unit="m", ge=0.0, le=FARTHEST
+    )
     pose_angle: float = parameter(0.0, "Standard deviation added to its angles.", unit="deg", ge=0.0, lt=45.0)
     command_delay: float = parameter(0.0, "How late each command reaches the motors.", unit="s", ge=0.0, le=1.0)
 

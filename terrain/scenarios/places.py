@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from typing import Annotated
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field
 
 from mbf_abstract.config.findings import ConfigError, Finding
-from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry import FARTHEST_COORDINATE, FloatArray
 from mbf_abstract.parameters import ParameterModel, parameter
 
 FARTHEST = 10_000.0
@@ -17,14 +17,19 @@ FARTHEST = 10_000.0
 FULL_TURN = 6.2832
 """Largest heading [rad]; what is beyond was meant in degrees."""
 
+Coordinate = Annotated[float, Field(ge=-FARTHEST_COORDINATE, le=FARTHEST_COORDINATE)]
+"""A place along an axis [m]; one that is only too far from the world is reported as off the ground."""
+Offset = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
+"""A length in one of two directions, such as up and down [m]."""
+
 
 class PlanarPose(ParameterModel):
     """A place on the ground."""
 
-    x: float = parameter(..., "Position.", unit="m")
-    y: float = parameter(..., "Position.", unit="m")
+    x: Coordinate = parameter(..., "Position.", unit="m")
+    y: Coordinate = parameter(..., "Position.", unit="m")
     yaw: float = parameter(0.0, "Heading.", unit="rad", ge=-FULL_TURN, le=FULL_TURN)
-    z: float | None = parameter(None, "Height of the level that is meant; absent = the highest ground.", unit="m")
+    z: Coordinate | None = parameter(None, "Offset of the level that is meant; absent = the highest ground.", unit="m")
 
 
 Place = PlanarPose | str
@@ -36,7 +41,7 @@ def _in_order(interval: tuple[float, float]) -> tuple[float, float]:
     return interval
 
 
-Interval = Annotated[tuple[float, float], AfterValidator(_in_order)]
+Interval = Annotated[tuple[Coordinate, Coordinate], AfterValidator(_in_order)]
 
 
 def coordinates(places: Iterable[Place | None]) -> FloatArray:

@@ -12,7 +12,7 @@ from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.scenarios.faults import Fault
 from terrain.scenarios.noise import LocalizationNoise
 from terrain.scenarios.perturbation import Perturbation
-from terrain.scenarios.places import Place
+from terrain.scenarios.places import FARTHEST, Place
 from terrain.urdf_robots.robot_choice import RobotChoice
 
 NAME_OF_A_ROBOT = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # also of a folder, and the first part of sources of events
@@ -27,8 +27,8 @@ class Sensor(ParameterModel):
     )
     rate: float = parameter(10.0, "Scans a second.", unit="Hz", gt=0.0, le=60.0)
     rays: int = parameter(360, "Rays of a ring; columns of a camera, which has 3/4 as many rows.", ge=3, le=10_000)
-    max_range: float = parameter(10.0, "Range.", unit="m", gt=0.0)
-    noise: float = parameter(0.01, "Standard deviation of a range.", unit="m", ge=0.0)
+    max_range: float = parameter(10.0, "Range.", unit="m", gt=0.0, le=FARTHEST)
+    noise: float = parameter(0.01, "Standard deviation of a range.", unit="m", ge=0.0, le=FARTHEST)
     drop_out: float = parameter(0.0, "Share of rays without an answer.", ge=0.0, lt=1.0)
 
 

@@ -19,10 +19,10 @@ from mbf_abstract.config.findings import ConfigError, Finding, refused_at
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.scenarios.features import Feature, put_on
-from terrain.scenarios.places import FARTHEST
+from terrain.scenarios.places import FARTHEST, Coordinate
 from terrain.worlds.elevation_files import TerrainFileError, jacksboro, read_dem
 from terrain.worlds.floor_plan import OFFICE_MAP, read_floor_plan
-from terrain.worlds.generate import flat_terrain, fractal_terrain
+from terrain.worlds.generate import add_roughness, flat_terrain, fractal_terrain
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.mesh_world import MeshFileError, read_mesh_world
 from terrain.worlds.multi_level import MultiLevelWorld, bridge_over_road, parking_garage
@@ -49,7 +49,9 @@ class JacksboroWorld(TerrainWorld):
     type: Literal["jacksboro"]
     size: float = parameter(100.0, "Length along x.", unit="m", gt=1.0, le=1000.0)
     spacing: float | None = parameter(None, "Sample again at this distance; absent = the survey's own.", unit="m")
-    roughness: float = parameter(0.0, "Root mean square height of small bumps added to the survey.", unit="m", ge=0.0)
+    roughness: float = parameter(
+        0.0, "Root mean square height of small bumps added to the survey.", unit="m", ge=0.0, le=FARTHEST
+    )
 
     def heightfield(self, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
         """Read the survey that comes with matplotlib."""
@@ -64,7 +66,7 @@ class GeneratedWorld(TerrainWorld):
     size: tuple[float, float] = parameter((40.0, 30.0), "Length along x and y.", unit="m")
     spacing: float = parameter(0.25, "Distance of samples.", unit="m", gt=0.01, le=10.0)
     median_slope: float = parameter(0.0, "Median slope of the hills; 0 = level ground.", unit="deg", ge=0.0, lt=60.0)
-    roughness: float = parameter(0.0, "Root mean square height of small bumps.", unit="m", ge=0.0)
+    roughness: float = parameter(0.0, "Root mean square height of small bumps.", unit="m", ge=0.0, le=FARTHEST)
     features: tuple[Feature, ...] = parameter((), "Ridges, craters, ruts, roads, boulders, steps, in this order.")
 
     def heightfield(self, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
@@ -74,6 +76,7 @@ class GeneratedWorld(TerrainWorld):
                 terrain = fractal_terrain(*self.size, self.spacing, rng, self.median_slope, self.roughness)
             else:
                 terrain = flat_terrain(*self.size, self.spacing)
+                terrain = add_roughness(terrain, rng, self.roughness) if self.roughness > 0.0 else terrain
         for feature in self.features:
             terrain = put_on(terrain, feature, rng, keep_clear)
         return terrain
@@ -134,7 +137,7 @@ class MapWorld(BuildingWorld):
 
     type: Literal["map"]
     file: Path = parameter(..., "The map's yaml file.")
-    corner: tuple[float, float] | None = parameter(
+    corner: tuple[Coordinate, Coordinate] | None = parameter(
         None,
         "Where the lower left corner of the map, or of the upright box around a rotated one, is put in the world; "
         "not given = as in the file.",

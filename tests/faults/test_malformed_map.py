@@ -27,6 +27,7 @@ BAD_DESCRIPTIONS = {
     "infinite resolution": ({"resolution": float("inf")}, "resolution"),
     "origin of two": ({"origin": [0.0, 0.0]}, "origin"),
     "origin with nan": ({"origin": [0.0, float("nan"), 0.0]}, "origin"),
+    "origin far away": ({"origin": [1e200, 0.0, 0.0]}, r"origin\[0\]: .*<= 1e.09, got 1e.200"),
     "unknown mode": ({"mode": "binary"}, "mode"),
     "thresholds swapped": ({"occupied_thresh": 0.1, "free_thresh": 0.9}, "free_thresh"),
     "threshold too large": ({"occupied_thresh": 65}, "occupied_thresh"),

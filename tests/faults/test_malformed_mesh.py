@@ -30,6 +30,12 @@ def infinite_vertex():
     return vertices, faces
 
 
+def absurd_vertex():
+    vertices, faces = good()
+    vertices[3, 1] = -1e200
+    return vertices, faces
+
+
 def index_too_large():
     vertices, faces = good()
     faces[7, 1] = 16
@@ -93,6 +99,7 @@ def moebius_band():
 DEFECTS = [
     (nan_vertex, "non_finite", [5]),
     (infinite_vertex, "non_finite", [0]),
+    (absurd_vertex, "non_finite", [3]),
     (index_too_large, "index_out_of_range", [7]),
     (negative_index, "index_out_of_range", [7]),
     (zero_area, "zero_area", [18]),

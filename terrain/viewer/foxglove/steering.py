@@ -13,7 +13,7 @@ from typing import Any
 
 from mbf_abstract.config.known_keys import key_hint
 from mbf_abstract.config.navigation_parameters import NavigationParameters
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FARTHEST_COORDINATE, Pose
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from terrain.viewer.foxglove.protocol import ProtocolError
 
@@ -162,7 +162,7 @@ def _without_covariance(message: Any) -> Any:
 
 
 def _numbers(message: Any, part: str, inner: str, names: str) -> list[float]:
-    """Finite numbers of a part of a message, by name; raises ProtocolError where they are not there."""
+    """Numbers within ``FARTHEST_COORDINATE`` of a part of a message, by name; raises ProtocolError without them."""
     found = message.get(part)
     if inner:
         found = found.get(inner) if isinstance(found, dict) else None
@@ -175,6 +175,8 @@ def _numbers(message: Any, part: str, inner: str, names: str) -> list[float]:
         numbers = [math.inf]
     if not all(map(math.isfinite, numbers)):
         raise ProtocolError(f"{part}: a number is not finite")
+    if max(map(abs, numbers)) > FARTHEST_COORDINATE:
+        raise ProtocolError(f"{part}: a number is beyond {FARTHEST_COORDINATE:g}")
     return numbers
 
 

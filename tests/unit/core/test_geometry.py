@@ -22,6 +22,7 @@ from mbf_abstract.geometry import (
 )
 from mbf_abstract.geometry.arcs import poses_on_arc
 from mbf_abstract.geometry.rotations import level_quaternions
+from mbf_abstract.geometry.transform import InvalidTransformError, Transform
 
 angles = st.floats(-20.0, 20.0)
 coordinates = st.floats(-1e3, 1e3)
@@ -184,6 +185,25 @@ def test_numbers_that_are_not_finite_are_refused_by_name_or_index(bad):
         AckermannCommand(bad)
     with pytest.raises(NonFiniteError, match="pose 1"):
         Path(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, bad]]))
+
+
+@pytest.mark.parametrize("far", [1e200, -1e308, 1.1e9])
+def test_coordinates_beyond_the_bound_are_refused_by_name_or_index(far):
+    with pytest.raises(ValueError, match=r"^position\[1\] must be within 1e\+09 m of zero, got "):
+        Pose((0.0, far, 0.0))
+    for make in (Path, Path.from_points):
+        with pytest.raises(ValueError, match=r"^position of pose 1 of the path\[2\] must be within 1e\+09 m of zero"):
+            make(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, far]]))
+    with pytest.raises(InvalidTransformError, match=r"expected a translation within 1e\+09 m of zero, got \(0.0, "):
+        Transform((0.0, far, 0.0))
+
+
+def test_what_a_transform_takes_beyond_the_bound_is_an_error_of_transforms():
+    T_map_odom = Transform((9e8, 0.0, 0.0), parent="map", child="odom")
+    pose = Pose((9e8, 9e8, -9e8), frame_id="odom")
+    for apply, value in ((T_map_odom.apply_to_pose, pose), (T_map_odom.apply_to_path, Path.from_poses([pose]))):
+        with pytest.raises(InvalidTransformError, match=r"^transform 'map' -> 'odom': position"):
+            apply(value)
 
 
 def test_a_quaternion_off_unit_length_by_more_than_a_hundredth_is_refused():

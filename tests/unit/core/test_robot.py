@@ -110,9 +110,11 @@ def test_odometry_of_another_time_is_refused(driver, stamp, text):
         ((0.5, 0.0, 0.0), "answered with tuple"),
         (Odometry((0.5, 0.0, 0.0), 10.0), "holds tuple"),
         (Odometry(None, 10.0), "holds NoneType"),
+        (Odometry(Twist.planar(1e200), 10.0), "is faster than 200 m/s or rad/s"),
+        (Odometry(Twist.planar(0.1, wz=-1e4), 10.0), "is faster than 200 m/s or rad/s"),
     ],
 )
-def test_odometry_of_a_wrong_type_is_no_odometry(driver, answer, text):
+def test_odometry_of_a_wrong_type_or_an_absurd_speed_is_no_odometry(driver, answer, text):
     driver[0].answer = answer
     with pytest.raises(RobotStateError, match=text):
         driver[1].velocity()

@@ -109,6 +109,12 @@ def test_a_map_of_absurd_size_is_refused_before_memory_is_taken(size):
         CostmapParameters.model_validate(size)
 
 
+@pytest.mark.parametrize("key", ["origin_x", "origin_y"])
+def test_a_map_too_far_away_is_refused(key):
+    with pytest.raises(ValidationError, match=rf"(?s){key}.*equal to 1000000000"):
+        CostmapParameters.model_validate({key: 1e200})
+
+
 def test_a_disabled_layer_takes_no_part(build):
     costmap = build("static", static={"enabled": False})
     costmap.update(None, 0.0)

@@ -149,6 +149,28 @@ def test_an_obstacle_of_no_extent_or_an_absurd_one_is_a_mistake(size, expected, 
     assert f"expected a number {expected}, got" in report.findings[0].text
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "wrong"),
+    [
+        ("start", "{x: 1.0e+200, y: 2.5}", "start.x"),
+        ("goals", "[{x: 3.0, y: 2.5, z: -1.0e+200}]", "goals[0].z"),
+        ("obstacles", "[{x: 1.0e+200, y: 2.5}]", "obstacles[0].x"),
+        ("actors", "[{type: walker, route: [[1.0e+200, 2.5]]}]", "actors[0].route[0][0]"),
+        ("sensors", "[{type: planar, max_range: 1.0e+200}]", "sensors[0].max_range"),
+        ("localization", "{position_noise: 1.0e+200}", "localization.position_noise"),
+        ("perturb", "{pose_position: 1.0e+200}", "perturb.pose_position"),
+        ("faults", "[{type: jump, start: 1.0, dx: 1.0e+200}]", "faults[0].dx"),
+        ("world", "{type: generated, roughness: 1.0e+200}", "world.roughness"),
+        ("world", "{type: map, file: a.yaml, corner: [1.0e+200, 0]}", "world.corner[0]"),
+        ("world", "{type: generated, features: [{type: steps, x: 1.0e+200}]}", "world.features[0].x"),
+    ],
+)
+def test_an_absurd_place_or_length_is_a_mistake_at_its_key(key, value, wrong, tmp_path):
+    report = check_scenario(load_yaml(write(tmp_path, [("trial.yaml", key, value, "")])), load=False)
+    (mistake,) = report.findings
+    assert re.search(rf"{re.escape(wrong)}: expected a number .*, got -?1e\+200", mistake.text)
+
+
 def test_places_maps_and_plugins_are_checked_in_the_world_together_with_the_rest(tmp_path):
     mistakes = [
         ("trial.yaml", "start", "{x: 60.0, y: 2.5}", ""),

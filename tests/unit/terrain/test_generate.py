@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from terrain.scenarios.world_types import GeneratedWorld
 from terrain.worlds import generate
 from terrain.worlds.generate import flat_terrain, fractal_terrain
 
@@ -73,3 +74,9 @@ def test_a_road_has_its_own_heights_and_leaves_the_far_ground_alone() -> None:
     road = generate.add_road(hills, np.array([[2.0, 5.0, 0.0], [18.0, 5.0, 1.6]]), 2.0, 1.0)
     assert road.height_at([6.0, 10.0], [4.6, 5.4]).tolist() == pytest.approx([0.4, 0.8], abs=1e-3)
     assert np.allclose(road.height_at([5.0, 10.0], 15.0), hills.height_at([5.0, 10.0], 15.0))
+
+
+def test_level_ground_of_a_scenario_may_be_rough():
+    world = GeneratedWorld(type="generated", size=(10.0, 8.0), roughness=0.05)
+    ground = world.heightfield(np.random.default_rng(0), np.zeros((0, 2)))
+    assert float(np.sqrt(np.mean(np.square(ground.heights)))) == pytest.approx(0.05, rel=1e-3)

@@ -137,6 +137,8 @@ def test_a_robot_faces_another_one_that(other, expected):
         '{"name":"a","stamp":0,"path":[[0,0,0]],"remaining":0,"cannot_yield":false,"waits":0,"radius":-0.1}',
         '{"name":"a","stamp":0,"path":[[0,0,0]],"remaining":0,"cannot_yield":false,"waits":0,"radius":1e999}',
         '{"name":"a","stamp":0,"path":[[0,0,0]],"remaining":0,"cannot_yield":false,"waits":0,"radius":0,"distance":-1}',
+        '{"name":"a","stamp":0,"path":[[1e200,0,0]],"remaining":0,"cannot_yield":false,"waits":0,"radius":0}',
+        '{"name":"a","stamp":0,"path":[[0,0,0],[2e5,0,0]],"remaining":0,"cannot_yield":false,"waits":0,"radius":0}',
         "9" * 400,
         "null",
         pytest.param("[" * 100_000, id="nested too deeply"),

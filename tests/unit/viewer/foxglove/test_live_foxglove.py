@@ -252,6 +252,7 @@ def test_where_somebody_says_that_the_robot_is_the_localisation_believes(served,
             "not JSON: JSON has no number NaN",
         ),
         ({**GOAL, "pose": GOAL["pose"] | {"position": {"x": 10**400, "y": 0, "z": 0}}}, "a number is not finite"),
+        ({**GOAL, "pose": GOAL["pose"] | {"position": {"x": 1e200, "y": 0, "z": 0}}}, "a number is beyond 1e+09"),
         ({**GOAL, "pose": GOAL["pose"] | {"position": {"x": True, "y": 0, "z": 0}}}, "expected the numbers"),
     ],
 )
