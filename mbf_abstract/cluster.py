@@ -45,9 +45,12 @@ def run_on_cluster(
     """
     try:
         from distributed import Client, as_completed
+        from distributed.comm.addressing import parse_address, parse_host_port
     except ImportError as error:
         raise ClusterError("a cluster needs Dask: pip install 'mbf-flex[cluster]'") from error
     try:
+        if (parsed := parse_address(address))[0] == "tcp":
+            parse_host_port(parsed[1])  # the client, which a wrong address leaves half made, would end with a traceback
         client = Client(address, timeout=CONNECTION_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ClusterError(f"no scheduler answers at {address}: {error}") from error

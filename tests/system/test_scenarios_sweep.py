@@ -141,6 +141,12 @@ def test_a_scheduler_that_does_not_answer_is_reported():
         list(run_on_cluster(print, [], "nonsense://here"))
 
 
+def test_an_address_without_a_port_is_one_error():
+    finished = subprocess.run([sys.executable, "-c", CONNECT, "nonsense"], capture_output=True, text=True)
+    assert "no scheduler answers at nonsense: missing port" in finished.stderr
+    assert "Exception ignored" not in finished.stderr
+
+
 def test_workers_with_several_threads_are_refused(scheduler, worker):
     worker("two at once", threads=2)
 

@@ -37,7 +37,7 @@ def open_source(path: Path, parameters: MeshMapParameters, spacing: float = 0.0)
     """
     ending = path.suffix.lower()
     if (ending == ".npy") != (spacing > 0.0):
-        wanted = "needs a spacing" if ending == ".npy" else f"states its own spacing, got {spacing:g} m"
+        wanted = "needs a spacing (--spacing)" if ending == ".npy" else f"states its own spacing, got {spacing:g} m"
         raise MeshError(str(path), [wanted])
     if (ending == ".npy" or ending in elevation_readers()) and parameters.densify > 0.0:
         text = f"heights keep their grid in tiles: expected a mesh_map with densify 0, got {parameters.densify:g} m"

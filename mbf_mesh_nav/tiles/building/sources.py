@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.config.bounded_files import special_file
+from mbf_abstract.geometry import FARTHEST_COORDINATE
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
 from mbf_mesh_nav.files.vertex_errors import VertexErrors
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
@@ -129,10 +130,16 @@ class HeightSource(TileSource):
             raise ValueError(f"heights must be (ny, nx) with at least 2 x 2 samples, got {heights.shape}")
         if not (0.0 < dx < math.inf and 0.0 < dy < math.inf):
             raise ValueError(f"the spacing must be positive, got dx={dx}, dy={dy}")
+        if max((heights.shape[1] - 1) * dx, (heights.shape[0] - 1) * dy) > FARTHEST_COORDINATE:
+            got = f"{heights.shape[1]} x {heights.shape[0]} samples with a spacing of {dx:g} x {dy:g} m"
+            raise ValueError(f"heights must lie within {FARTHEST_COORDINATE:g} m of the first one, got {got}")
         self._heights, self._dx, self._dy = heights, dx, dy
 
     def keys(self, tile_size: float) -> list[TileKey]:
-        """All tiles of the grid."""
+        """All tiles of the grid; raises ValueError where they would be smaller than a square of it."""
+        if tile_size < max(self._dx, self._dy):
+            spacing = f"{max(self._dx, self._dy):g} m of the heights"
+            raise ValueError(f"expected a tile size of at least the spacing of {spacing}, got {tile_size:g} m")
         rows, columns = (
             -(-(count - 1) // squares)
             for count, squares in zip(self._heights.shape, self._squares(tile_size)[::-1], strict=True)
@@ -183,6 +190,8 @@ def open_heights(path: Path, max_samples: int) -> NDArray[np.floating]:
     MeshError
         The file cannot be read, is no grid of numbers, or holds more than ``max_samples``.
     """
+    if not path.exists():
+        raise MeshError(str(path), ["there is no such file"])
     try:
         if kind := special_file(path):
             raise ValueError(f"expected a file, got {kind}")

@@ -93,9 +93,15 @@ def test_a_mesh_is_densified_as_the_configuration_says(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("heights.npy",), "heights.npy: needs a spacing"),
+        (("heights.npy",), "heights.npy: needs a spacing (--spacing)"),
         (("mesh.ply", "--spacing", "0.5"), "mesh.ply: states its own spacing, got 0.5 m"),
         (("nothing.tif",), "nothing.tif: there is no such file"),
+        (("nothing.npy", "--spacing", "0.5"), "nothing.npy: there is no such file"),
+        (("heights.npy", "--spacing", "1e200"), "heights must lie within 1e+09 m of the first one, got "),
+        (
+            ("heights.npy", "--spacing", "0.5", "--tile-size", "0.1"),
+            "expected a tile size of at least the spacing of 0.5 m of the heights, got 0.1 m",
+        ),
         (("map.xyz",), "map.xyz: unknown ending '.xyz'"),
         (("heights.npy", "--spacing", "0.5", "--tile-size", "1", "--portal-length", "2"), "a portal length of at most"),
         (("heights.npy", "--spacing", "0.5", "--config", "dense.yaml"), "densify 0, got 0.2 m"),
