@@ -5,12 +5,13 @@ Units are SI (metres, radians, seconds); axes follow REP-103 (x forward, y left,
 quaternions that are not of unit length, so no code behind the border checks again.
 """
 
-from mbf_abstract.geometry.coordinates import FARTHEST_COORDINATE, NonFiniteError
 from mbf_abstract.geometry.path import Path
 from mbf_abstract.geometry.pose import Pose
 from mbf_abstract.geometry.rotations import (
+    FARTHEST_COORDINATE,
     QUATERNION_NORM_TOLERANCE,
     FloatArray,
+    NonFiniteError,
     Quaternion,
     Vector3,
     normalize_angle,

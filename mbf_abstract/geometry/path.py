@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbf_abstract.geometry.arithmetic import arctan2, norm, scalar_products
-from mbf_abstract.geometry.coordinates import FARTHEST_COORDINATE, NonFiniteError, coordinates
 from mbf_abstract.geometry.pose import Pose
 from mbf_abstract.geometry.rotations import (
+    FARTHEST_COORDINATE,
     QUATERNION_NORM_TOLERANCE,
     FloatArray,
+    NonFiniteError,
     Quaternion,
+    coordinates,
     level_quaternions,
     quaternions_from_axes,
 )

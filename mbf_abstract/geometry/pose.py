@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from mbf_abstract.geometry.coordinates import coordinates, finite
 from mbf_abstract.geometry.rotations import (
     QUATERNION_NORM_TOLERANCE,
     FloatArray,
     Quaternion,
     Vector3,
+    coordinates,
+    finite,
     quaternion_from_yaw,
     rotation_matrix,
     yaw_from_quaternion,

@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from mbf_abstract.geometry.coordinates import finite
-from mbf_abstract.geometry.rotations import Vector3
+from mbf_abstract.geometry.rotations import Vector3, finite
 
 
 @dataclass(frozen=True, slots=True)
