@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
+from mbf_abstract.maps.layers.layer import LayerParameters as LayerParameters
+from mbf_abstract.maps.layers.layer import MapLayer
 from mbf_abstract.maps.view import FloorMap, FloorWindow
 from mbf_costmap_nav.grid.costmap import FREE, MAX_CELLS, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
@@ -173,8 +174,7 @@ class CostmapLayer(MapLayer):
     @property
     def only_raises(self) -> bool:
         """Whether it never lowers the costs of the layers before it."""
-        overwrite = CombinationMethod.OVERWRITE
-        return getattr(self.parameters, "combination_method", overwrite) is not overwrite
+        return getattr(self.parameters, "combination_method", None) not in (None, CombinationMethod.OVERWRITE)
 
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Allowed speed [m/s] at the point (x, y) [m], at most ``full_speed``."""

@@ -49,6 +49,23 @@ def test_the_tests_of_new_packages_pass(tmp_path):
         assert f"{name}/tests/" in result.stdout
 
 
+@pytest.mark.timeout(300)
+def test_the_types_of_new_packages_are_strict(tmp_path):
+    pytest.importorskip("mypy")
+    paths = [str(REPOSITORY)]
+    for kind, map_name in [*((kind, one) for kind in ON_A_MAP for one in ("mesh", "costmap")), ("executive", "")]:
+        name = f"typed_{map_name}_{kind}"
+        mbf("new", kind, name, *(["--map", map_name] if map_name else []), "--out", tmp_path)
+        paths.append(str(tmp_path / name))
+    files = [str(file) for file in sorted(tmp_path.rglob("*.py"))]
+    assert len(files) == 2 * (len(paths) - 1)
+
+    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", os.devnull, *files]
+    environment = {**os.environ, "MYPYPATH": os.pathsep.join(paths)}
+    result = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment, check=False)
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
