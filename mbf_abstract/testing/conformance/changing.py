@@ -112,7 +112,7 @@ def a_layer_is_switched_off_while_driving(site: Site) -> None:
     """A layer that is switched off while the robot stands before its obstacle lets it drive on, and comes back."""
     site.place(WALL)
     handle = site.navigator.send(ExePathGoal(site.path((2.0, 4.0), (6.0, 4.0))))
-    site.rig.clock.sleep(6.0)
+    site.rig.clock.sleep(8.0)  # slowly, as it might be somebody who sets off
     site.expect_stands(1.0, "the path leads into the wall")
     _set_sensing_layers(site, enabled=False)
     site.expect_free(FACE)
