@@ -79,11 +79,18 @@ def write_state(done: int, mean: Numbers, spread: Numbers) -> None:
     WEIGHTS.write_text(json.dumps(mean.tolist(), indent=2) + "\n")
 
 
+def positive(text: str) -> int:
+    """Read a whole number of at least 1."""
+    if not (text.isdecimal() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"expected a whole number of at least 1, got {text!r}")
+    return int(text)
+
+
 def main() -> None:
     """Train from where the last call has stopped."""
     parser = argparse.ArgumentParser(description="Train the policy.")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--generations", type=int, default=GENERATIONS)
+    parser.add_argument("--workers", type=positive, default=2)
+    parser.add_argument("--generations", type=positive, default=GENERATIONS)
     asked = parser.parse_args()
     done, mean, spread = read_state()
     with multiprocessing.Pool(asked.workers) as pool:

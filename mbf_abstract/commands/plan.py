@@ -16,6 +16,7 @@ from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from mbf_abstract.commands.waiting import waiting
 
 if TYPE_CHECKING:
+    from mbf_abstract.config.configuration import Config
     from mbf_abstract.geometry import Pose
     from mbf_abstract.geometry.survey import Survey
     from mbf_abstract.goals.result_types import GetPathResult
@@ -65,6 +66,7 @@ def plan(
         from mbf_abstract.time.clock import wall_seconds
 
         cls, checked, notes = read_config_or_map(config, "" if unknown is None else unknown.value)
+        _require_planner(checked, planner)
         with ExitStack() as open_server:
             with waiting("building the map and its layers"):
                 server = open_server.enter_context(standing_server(cls, checked))
@@ -90,6 +92,16 @@ def plan(
     _report(result, seconds, notes, as_json, surveyed)
     if not result.success:
         raise typer.Exit(FAILURE)
+
+
+def _require_planner(config: Config, name: str) -> None:
+    """Refuse a name that no planner of the configuration has, before the map is built."""
+    from mbf_abstract.plugins import PluginKind
+
+    known = [plugin.name for plugin in config.plugins if plugin.kind is PluginKind.PLANNER]
+    if name and name not in known:
+        expected = f"one of {', '.join(known)}" if known else "none, as the configuration has no planners"
+        raise typer.BadParameter(f"expected {expected}, got {name!r}", param_hint="--planner")
 
 
 def _pose(

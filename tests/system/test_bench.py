@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from command_line import mbf
 from mbf_abstract.cli import make_app
 from mbf_abstract.config.findings import ConfigError
 from terrain.experiments.evaluation.all_sets import bench_all
@@ -128,8 +129,17 @@ def test_an_entry_of_one_set_cannot_be_driven_beside_in_all(tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(make_app(), ["bench", "all", "--planner", "dijkstra", "--beside", "any_angle"])
     assert done.exit_code == 2
-    assert "expected all, as the sets have entries of their own, got 'any_angle'" in " ".join(done.output.split())
+    text = "Invalid value for --beside: expected all, as the sets have entries of their own, got 'any_angle'"
+    assert text in " ".join(done.output.split())
     assert not list(tmp_path.iterdir())
+
+
+def test_results_beside_that_are_not_there_are_refused_before_anything_is_driven(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = mbf("bench", "indoor", "--planner", "dijkstra", "--beside", "nowhere/results.json")
+    assert done.exit_code == 2 and "Errno" not in done.output
+    assert "for --beside: expected a results.json or the name of a shipped entry, got 'nowhere/" in done.output
+    assert "there is no such file" in done.output and not list(tmp_path.iterdir())
 
 
 def test_planners_that_raise_crash_or_return_no_plan_have_their_reason_and_the_others_drive(tmp_path, monkeypatch):

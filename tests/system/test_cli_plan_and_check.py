@@ -182,6 +182,10 @@ def test_no_path_is_exit_code_1_with_the_planners_words():
         (("plan", "missing.yaml", "--start", "1", "2", "--goal", "3", "4"), "no such file"),
         (("plan", OFFICE, "--start", "1", "--goal", "3", "4"), "X Y [Z] [YAW]"),
         (("plan", OFFICE, "--goal", "3", "4"), "--start"),
+        (
+            ("plan", OFFICE, "--start", 3, 9.7, "--goal", 12, 9.7, "--planner", "typo"),
+            "for --planner: expected one of astar, dijkstra, theta_star, got 'typo'",
+        ),
         (("plugins", "--kind", "wheels"), "wheels"),
         (("check", "missing.yaml"), "missing.yaml"),
     ],

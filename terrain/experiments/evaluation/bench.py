@@ -78,7 +78,7 @@ def bench(protocol: Protocol, asked: Asked) -> None:
 
 def drive(protocol: Protocol, entries: list[Entry], asked: Asked, console: Console) -> Judged:
     """Drive the entries, and write results.json, leaderboard.html and the figures."""
-    others = {name: read_results(Path(name)) for name in asked.beside if _is_file(name)}
+    others = {name: read_results(Path(name)) for name in asked.beside if is_results_file(name)}
     if (shipped := shipped_results(protocol)) is not None:
         others["the shipped results"] = shipped
     rows = run_trials(protocol, entries, asked.out, asked.workers, asked.time_limit, _reporter(console))
@@ -122,13 +122,14 @@ def show(judged: Judged, console: Console) -> None:
 
 def entries_of(protocol: Protocol, asked: Asked) -> list[Entry]:
     """The user's entry, and the shipped ones that are driven too, each once."""
-    names = [name for name in asked.beside if not _is_file(name)]
+    names = [name for name in asked.beside if not is_results_file(name)]
     chosen = list(protocol.entries) if ALL_SHIPPED in names else list(dict.fromkeys(names))
     own = [entrant(protocol, asked.settings, asked.backend, asked.name)] if asked.settings else []
     return [*own, *(protocol.entry(name) for name in chosen)]
 
 
-def _is_file(name: str) -> bool:
+def is_results_file(name: str) -> bool:
+    """Whether a name of ``--beside`` is that of a file, not of a shipped entry."""
     return name.endswith(".json")
 
 

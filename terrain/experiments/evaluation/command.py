@@ -158,7 +158,8 @@ def everything(
 ) -> None:
     """Judge your planner or controller in all of them: on rough ground, among posts, among people of both kinds."""
     if beside not in ([], ["all"]):
-        raise typer.BadParameter(f"expected all, as the sets have entries of their own, got {' '.join(beside)!r}")
+        text = f"expected all, as the sets have entries of their own, got {' '.join(beside)!r}"
+        raise typer.BadParameter(text, param_hint="--beside")
     asked = _asked(context)
     with readable_errors(out):
         from terrain.experiments.evaluation import indoor as posts
@@ -189,11 +190,15 @@ def _levels(text: str) -> list[int]:
 def _asked(context: typer.Context) -> Asked:
     """What the options ask for that all parts have."""
     from terrain.commands.run import settings_of
-    from terrain.experiments.evaluation.bench import Asked
+    from terrain.experiments.evaluation.bench import Asked, is_results_file
 
     given = context.params
     chosen = settings_of(given["settings"], planner=given["planner"], controller=given["controller"])
     if not chosen and not given["beside"]:
         raise typer.BadParameter("nothing to judge: give --planner, --controller, --set or --beside")
+    for name in given["beside"]:
+        if is_results_file(name) and not Path(name).is_file():
+            text = f"expected a results.json or the name of a shipped entry, got {name!r}: there is no such file"
+            raise typer.BadParameter(text, param_hint="--beside")
     shared = {name: given[name] for name in ("backend", "name", "beside", "workers", "time_limit", "as_json")}
     return Asked(chosen, **shared, out=Path(given["out"]), command=command_line(context))

@@ -76,3 +76,13 @@ def test_the_shipped_weights_drive_through_a_room_that_they_were_not_trained_in(
         assert steps[-1][4]["success"], steps[-1][4]["verdict"]
     finally:
         environment.close()
+
+
+@pytest.mark.parametrize("words", [("--workers", "0"), ("--workers", "two"), ("--generations", "-1")])
+def test_a_training_without_workers_or_generations_is_refused(example, words, monkeypatch, capsys):
+    _, train = example
+    monkeypatch.setattr(sys, "argv", ["train.py", *words])
+    with pytest.raises(SystemExit) as ended:
+        train.main()
+    assert ended.value.code == 2
+    assert f"{words[0]}: expected a whole number of at least 1, got '{words[1]}'" in capsys.readouterr().err
