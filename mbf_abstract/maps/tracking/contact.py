@@ -230,18 +230,14 @@ def _first_reached(
     waiting: Sequence[TrackedObject],
     limits: ContactParameters,
 ) -> TrackedObject | None:
-    """Who might touch the robot before it stands if they set off now; each grows at its pace to all sides.
-
-    Those from whom the robot only gets away do not count.
-    """
-    now = _gaps_now(box, pose, waiting)
+    """Who might come within the margin before the robot stands if they set off now, at their pace in any direction."""
     middles = np.array([(known.x, known.y) for known in waiting])
-    radii, paces = np.array([(known.radius, known.pace) for known in waiting]).T
+    radii = np.array([known.radius for known in waiting]) + limits.contact_margin
+    paces = np.array([known.pace for known in waiting])
     braking = Decelerations(limits.decel_lim_x, limits.decel_lim_theta, limits.reaction_time)
     for times, poses in motions_to_standstill(pose, velocity, command, share, braking):
         places = np.broadcast_to(middles, (len(times), *middles.shape))
-        gaps = box.gaps(poses, places, radii)
-        reached = (gaps < times[:, None] * paces) & (gaps < now)
+        reached = box.gaps(poses, places, radii + times[:, None] * paces) < 0.0
         if reached.any():
             return waiting[int(np.argmax(reached[int(np.argmax(reached.any(axis=1)))]))]
     return None
