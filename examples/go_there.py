@@ -6,8 +6,10 @@ Run it twice and change nothing but the configuration::
     python examples/go_there.py indoor costmap
 """
 
+import argparse
 import sys
 
+from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.outcomes import ExePathOutcome
 from terrain.session.session import Session, SessionOptions
 
@@ -32,6 +34,11 @@ def main(scenario: str, backend: str) -> bool:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 3:
-        sys.exit(__doc__)
-    sys.exit(0 if main(sys.argv[1], sys.argv[2]) else 1)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenario", help="name of a shipped one, or a file")
+    parser.add_argument("backend", help="map to drive on: mesh or costmap")
+    given = parser.parse_args()
+    try:
+        sys.exit(0 if main(given.scenario, given.backend) else 1)
+    except ConfigError as error:
+        parser.exit(2, f"{error}\n")

@@ -7,8 +7,10 @@ when it takes too long::
     python examples/navigation_tree.py outdoor mesh
 """
 
+import argparse
 import sys
 
+from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.executives.pacing import TimeLimit
 from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_drawing import as_text
@@ -26,6 +28,11 @@ def main(scenario: str, backend: str, time_limit: float = 600.0) -> bool:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 3:
-        sys.exit(__doc__)
-    sys.exit(0 if main(sys.argv[1], sys.argv[2]) else 1)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenario", help="name of a shipped one, or a file")
+    parser.add_argument("backend", help="map to drive on: mesh or costmap")
+    given = parser.parse_args()
+    try:
+        sys.exit(0 if main(given.scenario, given.backend) else 1)
+    except ConfigError as error:
+        parser.exit(2, f"{error}\n")

@@ -8,12 +8,14 @@ runs on both maps::
     python examples/waypoints_state_machine.py indoor mesh
 """
 
+import argparse
 import sys
 from dataclasses import dataclass, field
 from itertools import permutations
 
 from py_trees.common import Status
 
+from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.executives.conditions import Do
 from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery
 from mbf_abstract.executives.state_machine import State, StateMachine
@@ -119,6 +121,11 @@ def main(scenario: str, backend: str) -> bool:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 3:
-        sys.exit(__doc__)
-    sys.exit(0 if main(sys.argv[1], sys.argv[2]) else 1)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenario", help="name of a shipped one, or a file")
+    parser.add_argument("backend", help="map to drive on: mesh or costmap")
+    given = parser.parse_args()
+    try:
+        sys.exit(0 if main(given.scenario, given.backend) else 1)
+    except ConfigError as error:
+        parser.exit(2, f"{error}\n")

@@ -66,6 +66,19 @@ def test_the_types_of_new_packages_are_strict(tmp_path):
     assert result.returncode == 0, result.stdout + result.stderr
 
 
+def test_ruff_finds_the_imports_of_new_packages_sorted(tmp_path):
+    pytest.importorskip("ruff")
+    for map_name, kinds in {"mesh": ON_A_MAP, "costmap": ON_A_MAP, "": ON_EVERY_MAP}.items():
+        for kind in kinds:
+            name = f"sorted_{map_name or 'any'}_{kind}"
+            mbf("new", kind, name, *(["--map", map_name] if map_name else []), "--out", tmp_path)
+    assert len(list(tmp_path.rglob("*.py"))) == 2 * (2 * len(ON_A_MAP) + len(ON_EVERY_MAP))
+
+    command = [sys.executable, "-m", "ruff", "check", "--no-cache", "--extend-select", "I", "."]
+    result = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
