@@ -42,7 +42,9 @@ def plan(
     start: str = typer.Option(..., "--start", metavar="X Y [Z] [YAW]", help="Where the robot stands [m, rad]."),
     goal: str = typer.Option(..., "--goal", metavar="X Y [Z] [YAW]", help="Where it shall go [m, rad]."),
     planner: str = typer.Option("", "--planner", help="Name of the planner; the first one if not given."),
-    tolerance: float = typer.Option(0.0, "--tolerance", min=0.0, help="How far from the goal the path may end [m]."),
+    tolerance: float = typer.Option(
+        0.0, "--tolerance", min=0.0, max=1000.0, help="How far from the goal the path may end [m]."
+    ),
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object, with all poses."),
     survey: bool = typer.Option(
         False, "--survey", help="Start, goal and poses are in coordinates of the survey of the map; degrees: LON LAT."

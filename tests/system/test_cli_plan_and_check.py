@@ -183,6 +183,10 @@ def test_no_path_is_exit_code_1_with_the_planners_words():
         (("plan", OFFICE, "--start", "1", "--goal", "3", "4"), "X Y [Z] [YAW]"),
         (("plan", OFFICE, "--goal", "3", "4"), "--start"),
         (
+            ("plan", OFFICE, "--start", 3, 9.7, "--goal", 12, 9.7, "--tolerance", "1e200"),
+            "Invalid value for '--tolerance': Input should be less than or equal to 1000",
+        ),
+        (
             ("plan", OFFICE, "--start", 3, 9.7, "--goal", 12, 9.7, "--planner", "typo"),
             "for --planner: expected one of astar, dijkstra, theta_star, got 'typo'",
         ),

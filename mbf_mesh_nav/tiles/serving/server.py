@@ -86,6 +86,7 @@ class TiledMapParameters(OutlineParameters):
         "Side of the part around the robot that sensors mark and controllers for meshes drive on.",
         unit="m",
         gt=0.0,
+        le=1e4,
         dynamic=False,
     )
     layers: tuple[MeshLayerEntry, ...] = parameter(

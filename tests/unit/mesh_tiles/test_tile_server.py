@@ -236,6 +236,7 @@ def test_the_picture_shows_the_highest_cost_of_every_pixel(tiled_hills, whole_hi
     ("block", "more", "error", "text"),
     [
         ("  profile: fast\n", "", MeshError, "no cost profile 'fast', the map has: default"),
+        ("  window: 1.0e+200\n", "", ConfigError, r"tiled_map.window: expected .*\b10000\b.*, got 1e\+200"),
         ("  memory: 1000\n", "", MeshError, "MB of memory, allowed are 0.001 MB"),
         ("", "global_frame: odom\n", MeshError, "in the frame 'map', the global_frame of the configuration is 'odom'"),
         ("", "controllers: [{name: field, type: vector_field}]\n", ServerError, "needs the whole mesh in memory"),
