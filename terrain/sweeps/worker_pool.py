@@ -3,8 +3,7 @@
 When to use: for runs of seconds to minutes, as those of sweeps and experiments. When not: for many short jobs, the
 hand-over costs more than they do.
 
-Each worker keeps to one processor core, if there are enough. The threads of a run in simulated time work by turns, and
-a turn that is handed to another core costs about twice as much.
+Each worker keeps to one processor core, if there are enough (``own_core.py``).
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from multiprocessing import current_process, get_context
 from types import FrameType
 from typing import TypeVar
 
+from terrain.sweeps.own_core import keep_to_one_core
 from terrain.sweeps.starting_workers import interrupts_arrive, interrupts_wait
 
 J = TypeVar("J")
@@ -78,17 +78,9 @@ def _run_in_pool(do: Callable[[J], R], waiting: Iterator[J], workers: int) -> It
 
 def _begin_worker(parent: int, workers: int) -> None:
     end_with_the_parent(parent)
-    keep_to_one_core(workers)
-
-
-def keep_to_one_core(workers: int) -> None:
-    """Give this worker, one of so many, a core of its own; nothing where there are fewer cores, or no way to choose."""
-    if not hasattr(os, "sched_setaffinity"):
-        return
-    cores = sorted(os.sched_getaffinity(0))
     number = current_process().name.rpartition("-")[2]  # workers that live at the same time have numbers in a row
-    if workers <= len(cores) and number.isdigit():
-        os.sched_setaffinity(0, {cores[int(number) % len(cores)]})
+    if number.isdigit():
+        keep_to_one_core(int(number), workers)
 
 
 def end_with_the_parent(parent: int) -> None:

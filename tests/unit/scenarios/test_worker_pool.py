@@ -6,6 +6,7 @@ import signal
 import pytest
 
 from mbf_abstract.testing.scripted_session import ScriptedSession
+from terrain.sweeps.own_core import take_one_of
 from terrain.sweeps.worker_pool import run_in_workers
 
 
@@ -39,3 +40,18 @@ def test_workers_keep_to_different_cores_unless_there_are_fewer_cores():
     found = [core for _, core in run_in_workers(cores_of, range(len(cores)), len(cores))]
     assert sorted(core for own in found for core in own) == sorted(cores)
     assert all(own == cores for _, own in run_in_workers(cores_of, [0], len(cores) + 1))
+
+
+def core_beside(cores):
+    return take_one_of(cores)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="processes cannot be given cores here")
+def test_a_worker_takes_a_core_that_no_worker_of_another_sweep_has():
+    """Two sweeps of one worker each on a machine with many cores both took the second one."""
+    cores = [100_000 + os.getpid() + k for k in (0, 1)]  # of no machine, and of no other test
+    ((_, beside),) = run_in_workers(core_beside, [cores], 1)
+    assert beside == cores[0], "a worker that has ended has given its core back"
+    assert [take_one_of(cores) for _ in range(3)] == [cores[0], cores[1], cores[0]]
+    ((_, last),) = run_in_workers(core_beside, [[cores[0], cores[1] + 1]], 1)
+    assert last == cores[1] + 1
