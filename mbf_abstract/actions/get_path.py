@@ -1,8 +1,7 @@
 """The ``get_path`` action: from a start and a target pose to a path in the global frame.
 
-Steps of one goal: check names and frames - start pose - map kept alive, and seen again where it was cleared - plugin
-under patience and retries, and the ``fallback_planner`` where that finds no path - the path is checked and
-transformed - result. The robot never moves.
+Steps of one goal: check names and frames - start pose - map kept alive - plugin under patience and retries, and the
+``fallback_planner`` where that finds no path - the path is checked and transformed - result. The robot never moves.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.plan_check import area_in_global_frame, in_global_frame, path_result
 from mbf_abstract.execution.planner import FALLBACK_OUTCOMES, PlannerExecution
-from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.feedback_types import NoFeedback
@@ -28,8 +26,6 @@ from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.goals.result_types import GetPathResult
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PluginKind
-
-SCAN_CHECK = 0.05  # s; how often a plan that waits for a scan looks for it
 
 Handle = GoalHandle[GetPathGoal, GetPathResult, NoFeedback]
 Job = GoalJob[GetPathGoal, GetPathResult, NoFeedback]
@@ -99,7 +95,6 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
             if missing := run.call_beside("the map's missing_floor()", self.runtime.map_hooks.missing_floor):
                 # permanent: no recovery brings a map
                 return GetPathResult(GetPathOutcome.MAP_ERROR, missing, planner=plugin.name, permanent=True)
-            self._await_scans(run)
             execution = PlannerExecution(run, request, area, has_fallback, handle.goal.max_retries)
             end = execution.execute()
             # 4. Check the path of a plugin that reports success.
@@ -109,12 +104,6 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
             numbers = {"cost": result.cost, "length": result.path.length, "poses": len(result.path)}
             self.runtime.events.emit(EventKind.PLAN, self.name, goal_id=handle.id, plugin=plugin.name, **numbers)
         return result
-
-    def _await_scans(self, run: PluginRun[AbstractPlanner]) -> None:
-        """Wait until a cleared map has seen again what stands there; not on a cancel, nor for a silent sensor."""
-        while not run.canceled and run.call_beside("the map's awaits_scan()", self.runtime.map_hooks.awaits_scan):
-            self.runtime.clock.sleep(SCAN_CHECK)
-            run.patience_watch.restart()  # patience is with the planner
 
     def _request(self, handle: Handle) -> PlanRequest:
         def to_global(pose: Pose) -> Pose:

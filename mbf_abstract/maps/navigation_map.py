@@ -56,12 +56,11 @@ class NavigationMap(ABC):
         """Why no command may be computed on the map at ``now`` [s]; empty if it is fresh."""
         return ""
 
-    def awaits_scan(self, now: float) -> bool:
-        """Whether a plan should wait, as a sensor has sent nothing since a clearing and may still do so in time."""
-        return False
-
     def update(self, robot_pose: Pose | None, now: float) -> object:
-        """Bring the map up to ``now`` [s], end overrides that are over; ``robot_pose`` is None while it is unknown."""
+        """Bring the map up to ``now`` [s], and end overrides of layer parameters that are over.
+
+        ``robot_pose`` is None while it is unknown.
+        """
         return None
 
     # ------------------------------------------------------------------------------------------------- sensors

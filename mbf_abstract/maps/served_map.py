@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any, Generic, TypeVar
 
 from mbf_abstract.drive.robot import RobotStateError
@@ -102,13 +102,6 @@ class ServedMap(Generic[Map]):
             self._report_floor()
         for event in self._motions.changes(self.tracked_objects()):
             self._runtime.events.emit(EventKind.OBJECT, self.name, **event)
-
-    def awaits_scan(self) -> bool:
-        """Whether the map waits for what its sensors see since it was cleared; scans that have come are taken in."""
-        if self.map.awaits_scan(self._runtime.clock.now()):
-            with suppress(Exception):  # a layer that raises makes the map stale, which it says itself
-                self.update()
-        return self.map.awaits_scan(self._runtime.clock.now())
 
     def _report_floor(self) -> None:
         """Note a new floor, and what is suspicious on it."""

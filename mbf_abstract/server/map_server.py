@@ -1,6 +1,7 @@
 """A server on maps: scans, questions, freshness, changes at run time, written once for every backend.
 
-A backend's server derives ``MapServer``, builds its maps in ``serve_maps``, hands them to plugins in ``make_context``.
+A backend's server derives ``MapServer``, builds its maps in ``serve_maps`` and hands them to plugins in
+``make_context``.
 """
 
 from __future__ import annotations
@@ -115,13 +116,12 @@ class MapServer(AbstractNavigationServer):
         return int(self.global_map.map.floors_taken)
 
     def map_problem(self, name: str = "") -> str:
-        """Why a map, by default the one driven on, is stale; plans are made on it, too. ServerError: no such map."""
+        """Why a map is stale, by default the one that the robot drives on; empty while it is fresh.
+
+        Plans are made on a stale map, too. Raises ServerError if there is no map of that name.
+        """
         served = self._served(name) if name else self.local_map
         return str(served.map.stale_reason(self.runtime.clock.now()))
-
-    def awaits_scan(self) -> bool:
-        """Whether the map that plans are made on does, see ``ServedMap.awaits_scan``."""
-        return self.global_map.awaits_scan()
 
     def path_problem(self, path: Path) -> str:
         """Where a path leaves the map that plans are made on; empty if it does not, or that is not known."""
@@ -155,7 +155,10 @@ class MapServer(AbstractNavigationServer):
         return within_speed_limit(maps, self.runtime.transforms, pose, answer, full_speed)
 
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
-        """What the robot would touch on the map that it drives on; TransformError where the pose is not known on it."""
+        """What the robot would touch on the map that it drives on; see ``NavigationMap.obstacle_ahead``.
+
+        Raises TransformError where the pose is not known on that map.
+        """
         navigation_map = self.local_map.map
         there = self.runtime.transforms.transform_pose(pose, navigation_map.frame_id)
         return str(navigation_map.obstacle_ahead(there, command, duration))
