@@ -12,8 +12,6 @@ import os
 import socket
 from collections.abc import Sequence
 
-_taken: list[socket.socket] = []  # for as long as this process lives
-
 
 def keep_to_one_core(number: int, workers: int) -> None:
     """Give worker ``number`` of so many a core of its own.
@@ -39,6 +37,6 @@ def take_one_of(cores: Sequence[int]) -> int:
         except OSError:
             name.close()
             continue
-        _taken.append(name)
+        name.detach()  # it stays open for as long as this process lives
         return core
     return cores[0]
