@@ -141,7 +141,8 @@ class _Validation:
     def _listed_names(self, key: str, plugin_list: str) -> None:
         """Check that the plugins a key names, one or a list of them, are among those of a list of the file."""
         names, items = self.data.get(key), self.data.get(plugin_list)
-        listed = [item["name"] for item in items or () if isinstance(item, dict) and isinstance(item.get("name"), str)]
+        named = (item.get("name") for item in items if isinstance(item, dict)) if isinstance(items, list) else ()
+        listed = [name for name in named if isinstance(name, str)]
         paths: list[tuple[KeyPath, Any]] = [((key,), names)]
         if isinstance(names, list):
             paths = [((key, index), name) for index, name in enumerate(names)]

@@ -323,6 +323,14 @@ def test_a_fallback_planner_that_the_file_does_not_list_is_refused_with_its_line
     assert finding.startswith("8: fallback_planner: expected the name of one of the planners, got 'secnd'")
 
 
+def test_a_list_of_planners_that_is_none_and_a_name_out_of_it_are_one_mistake_each(tmp_path):
+    text = "backend: mesh\nplanners: 1.0\nfallback_planner: first\nmesh_map: {mesh_file: hill.ply}\n"
+    assert refused(tmp_path, text) == [
+        "2: planners: expected a list of {name, type}, got 1.0",
+        "3: fallback_planner: expected the name of one of the planners, got 'first'",
+    ]
+
+
 def test_a_refiner_of_plans_that_the_file_does_not_list_is_refused_with_its_line(tmp_path):
     text = GOOD.replace("second: {", "plan_refiner: smooth\nsecond: {")
     assert refused(tmp_path, text) == ["8: plan_refiner: expected the name of one of the refiners, got 'smooth'"]
