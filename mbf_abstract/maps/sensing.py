@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry import FARTHEST_COORDINATE, FloatArray
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.geometry.transform_problems import ExtrapolationError
@@ -79,14 +79,14 @@ class RangeScan:
         return cls.of_rays(source, origin, cloud, np.ones(len(cloud), dtype=np.bool_), stamp, frame_id)
 
     def checked(self) -> RangeScan:
-        """A copy as arrays, as a driver may reuse its buffers, without the rays whose end is not finite.
+        """A copy as arrays, as a driver may reuse its buffers, without the rays whose end is not within 1e9 m of zero.
 
         A scan that is such a copy is returned as it is.
 
         Raises
         ------
         ValueError
-            Wrong shapes, or origin or stamp are not finite.
+            Wrong shapes, the stamp is not finite, or the origin not within ``FARTHEST_COORDINATE`` (1e9 m) of zero.
         """
         if self.is_checked:
             return self
@@ -94,7 +94,10 @@ class RangeScan:
         if not (np.isfinite(scan.origin).all() and math.isfinite(scan.stamp)):
             origin = scan.origin.tolist()
             raise ValueError(f"origin and stamp of a scan must be finite, got {origin} and {self.stamp}")
-        known = np.asarray(np.isfinite(scan.ends).all(axis=1))
+        if np.abs(scan.origin).max() > FARTHEST_COORDINATE:
+            limits = f"within {FARTHEST_COORDINATE:g} m of zero"
+            raise ValueError(f"the origin of a scan must be {limits}, got {scan.origin.tolist()}")
+        known = np.asarray((np.abs(scan.ends) <= FARTHEST_COORDINATE).all(axis=1))  # not those with NaN either
         if not known.all():
             scan = replace(scan, ends=scan.ends[known], hits=scan.hits[known])
         return replace(scan, is_checked=True)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry import FARTHEST_COORDINATE, FloatArray
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_ros.messages.geometry import InvalidValueError, MessageContext
@@ -32,7 +32,8 @@ def laser_scan_of(message: Message, context: MessageContext, source: str, receiv
     InvalidValueError
         An angle or a limit is not finite.
     """
-    farthest, nearest, step = message["range_max"], message["range_min"], message["angle_increment"]
+    farthest = min(message["range_max"], FARTHEST_COORDINATE)  # drivers send the largest float for a range without end
+    nearest, step = message["range_min"], message["angle_increment"]
     _refuse_infinite(message, "angle_min", "angle_increment", "range_min", "range_max")
     ranges = np.asarray(message["ranges"], dtype=np.float64)
     nothing = ranges == np.inf
@@ -48,7 +49,8 @@ def range_of(message: Message, context: MessageContext, source: str, received: f
 
     A fixed distance ranger (``min_range`` = ``max_range``) says -infinity for something and infinity for nothing.
     """
-    farthest, measured, opening = message["max_range"], message["range"], message["field_of_view"]
+    farthest = min(message["max_range"], FARTHEST_COORDINATE)
+    measured, opening = message["range"], message["field_of_view"]
     _refuse_infinite(message, "field_of_view", "max_range")
     if measured == -math.inf:
         measured = farthest

@@ -95,3 +95,12 @@ def test_a_checked_scan_is_a_copy_of_the_finite_rays():
         RangeScan("lidar", "map", (0.0, 0.0, 0.0), ends, [True], 1.0).checked()
     with pytest.raises(ValueError, match="origin and stamp of a scan must be finite"):
         RangeScan("lidar", "map", (float("inf"), 0.0, 0.0), ends, [True, True], 1.0).checked()
+
+
+@pytest.mark.parametrize("far", [1e300, -2e9])
+def test_rays_that_end_beyond_the_bound_of_coordinates_are_left_out_and_an_origin_there_is_refused(far):
+    scan = RangeScan.of_points("lidar", [[1.0, 0.0, 0.0], [0.0, far, 0.0]], (0.0, 0.0, 1.0), 2.0).checked()
+
+    assert scan.ends.tolist() == [[1.0, 0.0, 0.0]] and scan.hits.tolist() == [True]
+    with pytest.raises(ValueError, match=r"origin of a scan must be within 1e\+09 m of zero"):
+        RangeScan.of_points("lidar", [[1.0, 0.0, 0.0]], (0.0, far, 0.0), 2.0).checked()

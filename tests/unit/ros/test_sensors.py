@@ -53,6 +53,17 @@ def test_a_scan_with_an_infinite_angle_is_refused(field):
         laser_scan_of(laser([1.0], **{field: None}), CONTEXT, "lidar", 0.0)
 
 
+def test_rays_that_met_nothing_have_an_end_where_a_range_has_none():
+    largest = 3.4028234663852886e38
+    scan = laser_scan_of(laser([math.inf, 2.0, 1e30], range_max=largest), CONTEXT, "lidar", 0.0).checked()
+    fields = {"header": HEADER, "field_of_view": 0.0, "min_range": 0.1, "max_range": largest, "range": math.inf}
+    single = range_of(completed("sensor_msgs/Range", fields), CONTEXT, "sonar", 0.0).checked()
+
+    assert scan.hits.tolist() == [False, True]
+    assert np.hypot(*scan.ends[0, :2]) == pytest.approx(1e9)
+    assert len(single.ends) > 0 and not single.hits.any()
+
+
 def naive_sectors(scan, rays):
     """Nearest hit of each sector, infinity where only misses are, else NaN."""
     nearest = [math.nan] * rays
