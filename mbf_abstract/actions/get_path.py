@@ -19,6 +19,7 @@ from mbf_abstract.execution.plan_check import area_in_global_frame, in_global_fr
 from mbf_abstract.execution.planner import FALLBACK_OUTCOMES, PlannerExecution
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.goals.arrival_tolerance import plan_tolerance_problem
 from mbf_abstract.goals.feedback_types import NoFeedback
 from mbf_abstract.goals.goal_area import GoalArea
 from mbf_abstract.goals.goal_types import GetPathGoal
@@ -51,10 +52,8 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
 
     def _problem(self, goal: GetPathGoal) -> tuple[int, str] | None:
         """1. Accept only what can be answered: sane tolerances."""
-        distance, angle = self._tolerances(goal)
-        if not (distance >= 0.0 and angle >= 0.0):  # not a number is no tolerance either
-            return GetPathOutcome.INVALID_GOAL, f"tolerances must not be negative, got {distance} m and {angle} rad"
-        return None
+        problem = plan_tolerance_problem(*self._tolerances(goal))
+        return (GetPathOutcome.INVALID_GOAL, problem) if problem else None
 
     def execute(self, job: Job) -> GetPathResult:
         """2. to 4.: from the accepted goal to its result, on the slot's thread."""

@@ -44,6 +44,7 @@ class NavigationParameters(ParameterModel):
         "than that tolerance, the message of its success names the distance.",
         unit="m",
         ge=0.0,
+        le=1000.0,
     )
     refiner_max_retries: int = parameter(
         0, "Further refiner calls after a failure; 0 = none, -1 = unlimited.", ge=-1, le=1000
@@ -79,7 +80,12 @@ class NavigationParameters(ParameterModel):
         False, "Whether arrival is decided by the tolerances alone; the controller is not asked.", dynamic=False
     )
     dist_tolerance: float = parameter(
-        0.1, "Distance to the goal that counts as arrived, where a goal gives none.", unit="m", ge=0.0, dynamic=False
+        0.1,
+        "Distance to the goal that counts as arrived, where a goal gives none.",
+        unit="m",
+        ge=0.0,
+        le=1000.0,
+        dynamic=False,
     )
     angle_tolerance: float = parameter(
         math.pi / 18.0, "The same for the heading.", unit="rad", ge=0.0, le=math.pi, dynamic=False

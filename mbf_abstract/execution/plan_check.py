@@ -14,6 +14,7 @@ from mbf_abstract.event_values import error_text
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import Transform, TransformError
+from mbf_abstract.goals.arrival_tolerance import LARGEST_ANGLE, LARGEST_DISTANCE
 from mbf_abstract.goals.goal_area import GoalArea, TransformedArea
 from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal
 from mbf_abstract.goals.result_types import GetPathResult
@@ -41,10 +42,10 @@ def area_in_global_frame(area: GoalArea | None, runtime: Runtime) -> GoalArea | 
 
 def tolerance_problem(goal: ExePathGoal | MoveBaseGoal) -> str:
     """Why the tolerances of a goal can not be used; empty if they can."""
-    for name in ("dist_tolerance", "angle_tolerance"):
+    for name, largest in (("dist_tolerance", LARGEST_DISTANCE), ("angle_tolerance", LARGEST_ANGLE)):
         value = getattr(goal, name)
-        if value is not None and not value > 0.0:  # not a number is no tolerance either
-            return f"{name} must be positive, got {value}"
+        if value is not None and not 0.0 < value <= largest:  # not a number is no tolerance either
+            return f"{name} must be positive and at most {largest:.6g}, got {value}"
     return ""
 
 

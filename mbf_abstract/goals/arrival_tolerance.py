@@ -11,8 +11,25 @@ from dataclasses import replace
 
 from mbf_abstract.plugins import PlanResult
 
+LARGEST_DISTANCE = 1000.0
+"""Largest tolerance [m] of a goal's position; no robot has arrived that far from its goal."""
+
+LARGEST_ANGLE = 2.0 * math.pi
+"""Largest tolerance [rad] of a goal's heading; all headings are within pi; clients round that up, or send a turn."""
+
 LEAST_SHARE_LEFT = 0.25
 """Of the tolerance, for stopping at the end of a path that does not reach the target."""
+
+
+def plan_tolerance_problem(distance: float, angle: float) -> str:
+    """Why a path or a pose may not be so far [m, rad] from its target; empty if it may. inf means anywhere."""
+    if not (distance >= 0.0 and angle >= 0.0):  # not a number is no tolerance either
+        return f"tolerances must not be negative, got {distance} m and {angle} rad"
+    if LARGEST_DISTANCE < distance < math.inf:
+        return f"dist_tolerance must be at most {LARGEST_DISTANCE:g} m (inf = anywhere), got {distance}"
+    if LARGEST_ANGLE < angle < math.inf:
+        return f"angle_tolerance must be at most {LARGEST_ANGLE:.2f} rad, got {angle}"
+    return ""
 
 
 def planned_tolerance(tolerance: float) -> float:

@@ -19,6 +19,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.polygon import inside_polygon
 from mbf_abstract.geometry.tangent_plane import SAME_STOREY, heading_error
 from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.goals.arrival_tolerance import plan_tolerance_problem
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 
@@ -155,6 +156,8 @@ class PoseSetArea(GoalArea):
     def __post_init__(self) -> None:
         if not self.poses or len({pose.frame_id for pose in self.poses}) > 1:
             raise ValueError("a set of goal poses has at least one pose, and all in one frame")
+        if problem := plan_tolerance_problem(self.dist_tolerance, self.angle_tolerance):
+            raise ValueError(problem)
 
     @property
     def frame_id(self) -> str:

@@ -28,7 +28,8 @@ class GetPathGoal:
         None = from where the robot is.
     dist_tolerance, angle_tolerance : float, optional
         How far [m, rad] from the target the path may end where the target itself cannot be reached; 0 = exactly there,
-        None = the server's tolerances (with a ``goal_area`` 0: the area is tolerance enough).
+        at most 1000 m and 2 pi, or inf = anywhere; None = the server's tolerances (with a ``goal_area`` 0: the area is
+        tolerance enough).
     via : tuple of Pose
         Poses to pass between start and target, in order.
     goal_area : GoalArea, optional
@@ -112,8 +113,9 @@ class MoveBaseGoal:
         Names to try in order; None = all that are loaded, in load order, but for those of ``escalation_behaviors``
         and the one that is run where robots meet, see ``right_of_way_behavior``; empty = none.
     dist_tolerance, angle_tolerance : float, optional
-        Arrival tolerances [m, rad], None = the server's. Where the target cannot be reached, the path may end that far
-        from it too; the robot then comes the nearer to the path's end, at least to a quarter of the tolerance.
+        Arrival tolerances [m, rad] of at most 1000 m and 2 pi, None = the server's. Where the target cannot be reached,
+        the path may end that far from it too; the robot then comes the nearer to the path's end, at least to a quarter
+        of the tolerance.
     goal_area : GoalArea, optional
         Go to the cheapest place inside instead of to ``target_pose``, and stop as soon as inside.
     via : tuple of Pose

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.goals.arrival_tolerance import plan_tolerance_problem
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import AS_CONFIGURED, CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.served_map import ServedMap
@@ -86,10 +87,10 @@ class MapQueries:
         Raises
         ------
         ValueError
-            A tolerance is negative or no number.
+            A tolerance is negative, no number, or beyond 1000 m or a full turn without being inf.
         """
-        if not (dist_tolerance >= 0.0 and angle_tolerance >= 0.0):
-            raise ValueError(f"tolerances must not be negative, got {dist_tolerance} m and {angle_tolerance} rad")
+        if problem := plan_tolerance_problem(dist_tolerance, angle_tolerance):
+            raise ValueError(problem)
         served = self._of(query)
         with served.in_use():
             there = self._on(served, pose)

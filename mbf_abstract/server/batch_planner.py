@@ -26,6 +26,7 @@ from mbf_abstract.execution.plan_check import in_global_frame, path_result
 from mbf_abstract.execution.plugin_answer import PluginFault, checked_answer
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.goals.arrival_tolerance import plan_tolerance_problem
 from mbf_abstract.goals.result_types import GetPathResult
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginKind
@@ -104,13 +105,13 @@ class BatchPlanner:
         TypeError
             A start or goal is no pose.
         ValueError
-            Not as many starts as goals, or a tolerance is negative.
+            Not as many starts as goals, or a tolerance that a ``GetPathGoal`` may not have.
         """
         pairs, parameters = _checked_pairs(starts, goals), self._server.runtime.parameters
         distance = parameters.dist_tolerance if dist_tolerance is None else dist_tolerance
         angle = parameters.angle_tolerance if angle_tolerance is None else angle_tolerance
-        if not (distance >= 0.0 and angle >= 0.0):  # not a number is no tolerance either
-            raise ValueError(f"tolerances must not be negative, got {distance} m and {angle} rad")
+        if problem := plan_tolerance_problem(distance, angle):
+            raise ValueError(problem)
         token = cancel_token or CancelToken()
         if not self._busy.acquire(blocking=False):
             raise ServerError("this batch planner is in use by another thread; make one for each")

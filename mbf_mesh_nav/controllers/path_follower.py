@@ -55,7 +55,7 @@ class PathFollowerParameters(InertiaParameters):
     )
     slope_speed_factor: float = parameter(0.5, "Share of the speed left on slow_slope and beyond.", gt=0.0, le=1.0)
     goal_distance: float = parameter(
-        0.08, "Nearer to the goal than this the robot only turns to the final heading.", unit="m", gt=0.0
+        0.08, "Nearer to the goal than this the robot only turns to the final heading.", unit="m", gt=0.0, le=1000.0
     )
     max_path_distance: float = parameter(
         1.0, "Farther from the path than this the path is missed.", unit="m", gt=0.0, allow_inf=True

@@ -48,7 +48,7 @@ class VectorFieldParameters(InertiaParameters):
     arrival_fading: float = parameter(0.5, "The speed falls linearly within this distance.", unit="m", gt=0.0, le=5.0)
     min_speed: float = parameter(0.08, "Speed at which fading ends.", unit="m/s", gt=0.0, le=1.0)
     goal_distance: float = parameter(
-        0.08, "Nearer to the goal than this the robot only turns to the final heading.", unit="m", gt=0.0
+        0.08, "Nearer to the goal than this the robot only turns to the final heading.", unit="m", gt=0.0, le=1000.0
     )
     check_ahead_dist: float = parameter(
         1.0,

@@ -56,7 +56,7 @@ class MPPIParameters(InertiaParameters):
     pitch_limit: float = parameter(0.5, "Pitch that counts 1.", unit="rad", gt=0.0, le=1.5)
     cost_limit: float = parameter(1.0, "Vertices whose cost reaches this are impassable.", gt=0.0, allow_inf=True)
     goal_distance: float = parameter(
-        0.1, "Nearer to the goal than this the robot only turns to the final heading.", unit="m", gt=0.0
+        0.1, "Nearer to the goal than this the robot only turns to the final heading.", unit="m", gt=0.0, le=1000.0
     )
     max_path_distance: float = parameter(2.0, "Farther from the path than this it is missed.", unit="m", gt=0.0)
     max_surface_distance: float = parameter(

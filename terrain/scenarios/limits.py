@@ -20,8 +20,11 @@ class Limits(ParameterModel):
         "three standard deviations of the pose.",
         unit="m",
         gt=0.0,
+        le=1000.0,
     )
-    goal_angle: float | None = parameter(None, "Largest true angle to it; absent likewise.", unit="deg", gt=0.0)
+    goal_angle: float | None = parameter(
+        None, "Largest true angle to it; absent likewise.", unit="deg", gt=0.0, le=180.0
+    )
     forbidden: tuple[IncidentKind, ...] = parameter((), "Incidents that must not happen.")
 
 

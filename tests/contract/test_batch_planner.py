@@ -259,6 +259,7 @@ def test_no_pairs_give_no_plans(session):
     [
         ({"goals": []}, ValueError, "as many starts as goals are needed, got 1 and 0"),
         ({"dist_tolerance": float("nan")}, ValueError, "tolerances must not be negative"),
+        ({"dist_tolerance": 1e30}, ValueError, "dist_tolerance must be at most 1000 m"),
         ({"goals": [None]}, TypeError, r"goals\[0\] must be a Pose, got NoneType"),
     ],
 )

@@ -1,5 +1,7 @@
 """The exe_path action: plan updates, slots, cancel both ways, pause."""
 
+import math
+
 import pytest
 
 from mbf_abstract.events import EventKind
@@ -269,6 +271,11 @@ def test_a_new_plan_wakes_a_paused_loop(make_session):
         ({"path": Path.from_poses([])}, Outcome.INVALID_PATH, "the path has no poses"),
         ({"dist_tolerance": 0.0}, Outcome.INVALID_PATH, "dist_tolerance must be positive"),
         ({"angle_tolerance": -1.0}, Outcome.INVALID_PATH, "angle_tolerance must be positive"),
+        (
+            {"dist_tolerance": math.inf},
+            Outcome.INVALID_PATH,
+            "dist_tolerance must be positive and at most 1000, got inf",
+        ),
         ({"concurrency_slot": -1}, Outcome.INTERNAL_ERROR, "0..255"),
     ],
 )

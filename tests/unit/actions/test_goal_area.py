@@ -170,6 +170,8 @@ def test_every_member_of_a_disc_is_inside_it():
         (lambda: PolygonArea(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))), "at least three corners, got 2"),
         (lambda: PolygonArea(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))), "encloses no area"),
         (lambda: PoseSetArea(()), "at least one pose"),
+        (lambda: PoseSetArea(STATIONS.poses, dist_tolerance=-1.0), "tolerances must not be negative"),
+        (lambda: PoseSetArea(STATIONS.poses, angle_tolerance=360.0), "angle_tolerance must be at most 6.28 rad"),
         (lambda: PoseSetArea((Pose.planar(0, 0), Pose.planar(0, 0, frame_id="odom"))), "all in one frame"),
     ],
 )

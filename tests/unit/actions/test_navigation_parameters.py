@@ -108,3 +108,11 @@ def test_a_parameter_that_is_read_once_is_not_accepted_without_effect(make_sessi
 def test_a_robot_without_odometry_counts_as_standing(make_session):
     session = make_session(use_odometry=False)
     assert not session.server.runtime.robot.has_odometry
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "bound"), [("dist_tolerance", 1e30, "1000"), ("plan_end_tolerance", 1e30, "1000")]
+)
+def test_a_tolerance_in_which_every_place_is_the_goal_is_refused_by_name(field, value, bound):
+    with pytest.raises(ValueError, match=rf"{field}\n.*less than or equal to {bound}"):
+        NavigationParameters(**{field: value})

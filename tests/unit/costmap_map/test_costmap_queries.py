@@ -120,6 +120,12 @@ def test_tolerances_that_are_no_numbers_are_misuse(queries, tolerances):
         queries.find_valid_pose(Pose.planar(5.0, 5.0), *tolerances)
 
 
+def test_a_tolerance_beyond_all_use_is_named_and_inf_means_anywhere(queries):
+    with pytest.raises(ValueError, match=r"dist_tolerance must be at most 1000 m \(inf = anywhere\), got 1e\+30"):
+        queries.find_valid_pose(Pose.planar(5.0, 5.0), 1e30, 0.0)
+    assert queries.find_valid_pose(Pose.planar(5.0, 5.0), math.inf, math.inf).pose is not None
+
+
 def test_path_cells_only_ignores_outline_and_safety_distance(queries):
     path = Path.from_points([(x + 0.5, 5.5, 0.0) for x in range(2)])
     query = PlaceQuery(safety_dist=3.0)

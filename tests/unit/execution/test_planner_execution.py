@@ -255,6 +255,8 @@ def test_tolerances_a_goal_does_not_give_are_those_of_the_server_and_0_is_exact(
         ({"dist_tolerance": -1.0}, Outcome.INVALID_GOAL, "must not be negative"),
         ({"dist_tolerance": float("nan")}, Outcome.INVALID_GOAL, "must not be negative, got nan m"),
         ({"angle_tolerance": float("nan")}, Outcome.INVALID_GOAL, "must not be negative"),
+        ({"dist_tolerance": 1e30}, Outcome.INVALID_GOAL, "dist_tolerance must be at most 1000 m (inf = anywhere)"),
+        ({"angle_tolerance": 360.0}, Outcome.INVALID_GOAL, "angle_tolerance must be at most 6.28 rad, got 360"),
         ({"concurrency_slot": 256}, Outcome.INTERNAL_ERROR, "0..255"),
     ],
 )

@@ -1,5 +1,6 @@
 """Points, poses and paths on a floor with one wall of lethal vertices at x = 2, and a storey above it."""
 
+import math
 from contextlib import nullcontext
 
 import numpy as np
@@ -170,6 +171,12 @@ def test_a_path_of_which_less_than_no_pose_is_skipped_is_misuse(queries: MapQuer
 def test_a_tolerance_that_is_negative_or_no_number_is_misuse(queries: MapQueries, tolerance: float):
     with pytest.raises(ValueError, match="tolerances must not be negative"):
         queries.find_valid_pose(Pose.planar(2.0, 1.0), tolerance, 0.0)
+
+
+def test_a_tolerance_beyond_all_use_is_named_and_inf_means_anywhere(queries: MapQueries):
+    with pytest.raises(ValueError, match=r"dist_tolerance must be at most 1000 m \(inf = anywhere\), got 1e\+30"):
+        queries.find_valid_pose(Pose.planar(2.0, 1.0), 1e30, 0.0)
+    assert queries.find_valid_pose(Pose.planar(2.0, 1.0), math.inf, math.inf).pose is not None
 
 
 def test_between_vertices_where_the_robot_touches_nothing_it_touches_nothing():

@@ -99,6 +99,8 @@ def test_many_goals_at_once_leave_only_the_newest(make_session):
         ({"recovery_behaviors": ("first", "x")}, "no recovery behavior named 'x'"),
         ({"dist_tolerance": 0.0}, "dist_tolerance must be positive"),
         ({"angle_tolerance": -1.0}, "angle_tolerance must be positive"),
+        ({"dist_tolerance": 1e30}, "dist_tolerance must be positive and at most 1000, got 1e+30"),
+        ({"angle_tolerance": 360}, "angle_tolerance must be positive and at most 6.28319, got 360"),
     ],
 )
 def test_a_goal_that_can_not_be_served_is_rejected_with_the_reason(make_session, fields, words):
