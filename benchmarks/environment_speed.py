@@ -8,6 +8,7 @@ built once before the clock starts. CartPole integrates four numbers: it shows w
 
 from __future__ import annotations
 
+import argparse
 import time
 
 import gymnasium
@@ -56,6 +57,7 @@ def measure(name: str, arguments: dict) -> tuple[float, float]:
 
 def main() -> None:
     """Measure all cases."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     print(f"{'environment':42} {'steps/s':>9} {'reset [ms]':>11}")
     for case, arguments in CASES.items():
         rate, reset = measure(case.split(",")[0].split(" ")[0], arguments)

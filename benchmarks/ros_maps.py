@@ -7,6 +7,7 @@ With rclpy (see docs/ros2.md) also the time in which rclpy would make the same b
 
 from __future__ import annotations
 
+import argparse
 import json
 import statistics
 import time
@@ -93,6 +94,7 @@ def show(text: str, kind: str, make: Callable[[], Any]) -> None:
 
 def main() -> None:
     """Print one line for each message."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     for window, text in ((0, "whole"), (100, "update of 100 x 100"), (1000, "update of all cells")):
         print(f"costmap {SIDE} x {SIDE}, {text}: {milliseconds(grid_messages(window))}")
     view, context = GridView(np.zeros((SIDE, SIDE), np.float32), (0.0, 50.0, 0.0, 50.0)), MessageContext()

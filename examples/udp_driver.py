@@ -9,11 +9,13 @@ It must stop by itself when nothing has come for half a second. To go to (4, 2):
     python examples/udp_driver.py my_robot.yaml 10.0.0.5:7000 4.0 2.0
 """
 
+import argparse
 import json
 import socket
 import sys
 import threading
 
+from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.geometry.transform import Transform
@@ -32,7 +34,7 @@ class UdpRobot:
         self._clock, self._transforms = clock, transforms
         self._odometry: Odometry | None = None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.connect(base)  # looks its name up, once, and lets nobody else's datagrams in
+        self._socket.connect(base)  # lets nobody else's datagrams in
         threading.Thread(target=self._listen, daemon=True).start()
 
     def wait_until_heard(self, timeout: float) -> bool:
@@ -74,12 +76,11 @@ class UdpRobot:
         self.heard.set()
 
 
-def main(config: str, base: str, x: float, y: float) -> bool:
-    host, _, port = base.rpartition(":")
+def main(config: str, base: tuple[str, int], x: float, y: float) -> bool:
     clock, transforms = WallClock(), TransformBuffer()
-    robot = UdpRobot((host, int(port)), clock, transforms)
+    robot = UdpRobot(base, clock, transforms)
     if not robot.wait_until_heard(FIRST_WORD):
-        print(f"{base} is silent")
+        print(f"{base[0]}:{base[1]} is silent")
         return False
     with Navigator.from_file(config, robot, clock, transforms) as navigator:  # the robot stops at the end of the block
         navigator.server.warm_up(navigator.robot_pose(), navigator.ground_pose(x, y))
@@ -88,7 +89,25 @@ def main(config: str, base: str, x: float, y: float) -> bool:
         return result.success
 
 
+def address(text: str) -> tuple[str, int]:
+    """Read the base's address, and look its name up."""
+    host, _, port = text.rpartition(":")
+    if not (host and port.isdecimal() and 0 < int(port) < 65536):
+        raise argparse.ArgumentTypeError(f"expected HOST:PORT, got {text!r}")
+    try:
+        return socket.gethostbyname(host), int(port)
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"{host}: {error.strerror}") from None
+
+
 if __name__ == "__main__":
-    if len(sys.argv) != 5:
-        sys.exit(__doc__)
-    sys.exit(0 if main(sys.argv[1], sys.argv[2], float(sys.argv[3]), float(sys.argv[4])) else 1)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("config")
+    parser.add_argument("base", type=address, metavar="HOST:PORT")
+    for axis in ("x", "y"):
+        parser.add_argument(axis, type=float, help="of the goal [m]")
+    given = parser.parse_args()
+    try:
+        sys.exit(0 if main(given.config, given.base, given.x, given.y) else 1)
+    except (ConfigError, ValueError) as error:
+        parser.exit(2, f"{error}\n")

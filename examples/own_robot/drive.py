@@ -5,18 +5,21 @@
     echo 4.0 2.0 1.57 > /run/own_robot/goals
 
 Ends with 0 after a goal that was reached, and with 1 where one is not, or where a line is cut: systemd starts it again.
+What is wrong with the call, a device or the configuration is one line, and the exit code 2.
 """
 
 import argparse
 import os
 import select
 import socket
+import stat
 import sys
 from contextlib import suppress
 
 from devices import Base, Beacons, Device, Lidar
 from serial_line import SerialLine
 
+from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
@@ -63,6 +66,8 @@ def serve(navigator: Navigator, pipe: str, devices: dict[str, Device]) -> int:
     """Drive to the places that are written into a pipe, until a line is cut; a new place replaces the one before."""
     if not os.path.exists(pipe):
         os.mkfifo(pipe, 0o660)
+    if not stat.S_ISFIFO(os.stat(pipe).st_mode):
+        raise ValueError(f"--goals: expected a named pipe, got {pipe}")
     goals = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
     while not (lost := still_there(devices)):
         ready, _, _ = select.select([goals], [], [], CYCLE)
@@ -129,4 +134,7 @@ if __name__ == "__main__":
     given = parser.parse_args()
     if given.to and len(given.to) not in (2, 3):
         parser.error(f"--to: expected X Y [YAW], got {len(given.to)} numbers")
-    sys.exit(main(given))
+    try:
+        sys.exit(main(given))
+    except (ConfigError, OSError, ValueError) as error:  # what is wrong at the start
+        parser.exit(2, f"{error}\n")

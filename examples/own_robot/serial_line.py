@@ -24,11 +24,13 @@ def checksum(text: str) -> int:
 
 
 class SerialLine:
-    """A device such as ``/dev/ttyUSB0``; raises OSError where it is not there."""
+    """A device such as ``/dev/ttyUSB0``; raises OSError where it is not there, or something else."""
 
     def __init__(self, device: str, speed: int = termios.B115200) -> None:
         self.device = device
         self._file = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        if not os.isatty(self._file):
+            raise OSError(f"{device} is no serial line")
         tty.setraw(self._file)  # no echo, no translation of line ends
         attributes = termios.tcgetattr(self._file)
         attributes[4] = attributes[5] = speed

@@ -204,6 +204,16 @@ def test_the_service_takes_goals_from_a_pipe_and_ends_with_the_robot_standing_wh
     assert math.dist((firmware.x, firmware.y), GOAL) > 0.5, "it stood before it was there"
 
 
+@pytest.mark.parametrize(("name", "text"), [("plain.txt", "is no serial line"), (".", "Is a directory: ")])
+def test_what_is_no_serial_line_is_named_in_one_line(tmp_path, name, text):
+    (tmp_path / "plain.txt").write_text("hello")
+    lines = [word for line in ("--base", "--lidar", "--beacons") for word in (line, str(tmp_path / name))]
+    command = [sys.executable, EXAMPLE / "drive.py", "robot.yaml", *lines, "--to", "1", "2"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+
+    assert done.returncode == 2 and text in done.stderr and done.stderr.count("\n") == 1, done.stderr
+
+
 def test_noise_and_half_a_line_do_not_get_through():
     serial_line = importlib.import_module("serial_line")
     master, slave = os.openpty()

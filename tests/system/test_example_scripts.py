@@ -1,4 +1,4 @@
-"""The scripts of ``examples`` that take a scenario and a backend: their help, and what they say of a wrong call."""
+"""The scripts of ``examples``: their help, and what they say of a wrong call."""
 
 import subprocess
 import sys
@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "examples"
 SCRIPTS = ("go_there", "navigation_tree", "waypoints_state_machine")
 
 
@@ -41,3 +42,30 @@ def test_an_unknown_scenario_or_backend_is_one_line(script, words, text):
 def test_a_missing_argument_is_named(script):
     done = called(script, "indoor")
     assert done.returncode == 2 and "required: backend" in done.stderr
+
+
+def test_the_driver_over_udp_prints_its_help():
+    done = called("udp_driver", "-h")
+    assert done.returncode == 0 and not done.stderr
+    assert "python examples/udp_driver.py my_robot.yaml 10.0.0.5:7000 4.0 2.0" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("base", "x", "text"),
+    [
+        ("127.0.0.1", "1", "expected HOST:PORT, got '127.0.0.1'"),
+        ("127.0.0.1:70000", "1", "expected HOST:PORT, got '127.0.0.1:70000'"),
+        ("127.0.0.1:seven", "1", "expected HOST:PORT, got '127.0.0.1:seven'"),
+        ("127.0.0.1:7000", "one", "argument x: invalid float value: 'one'"),
+    ],
+)
+def test_what_is_no_address_or_no_number_is_named_by_the_driver_over_udp(base, x, text):
+    done = called("udp_driver", "robot.yaml", base, x, "2")
+    assert done.returncode == 2 and done.stderr.splitlines()[-1].endswith(text), done.stderr
+
+
+@pytest.mark.parametrize("script", ["environment_speed", "ros_maps"])
+def test_benchmarks_without_options_print_their_help(script):
+    command = [sys.executable, str(ROOT / "benchmarks" / f"{script}.py"), "-h"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and f"python benchmarks/{script}.py" in done.stdout, done.stderr
