@@ -230,7 +230,11 @@ def _first_reached(
     waiting: Sequence[TrackedObject],
     limits: ContactParameters,
 ) -> TrackedObject | None:
-    """Who might come within the margin before the robot stands if they set off now, at their pace in any direction."""
+    """Who might come within the margin before the robot stands if they set off now, at their pace in any direction.
+
+    With the margin the disc over their longer side holds what they sweep if they first turn on the spot, as their
+    measured outline would not (decision 0124).
+    """
     middles = np.array([(known.x, known.y) for known in waiting])
     radii = np.array([known.radius for known in waiting]) + limits.contact_margin
     paces = np.array([known.pace for known in waiting])

@@ -239,6 +239,17 @@ def test_with_the_share_that_is_safe_nobody_who_turns_is_touched_before_that_is_
             return
 
 
+def braked(share, v, wz):
+    """Times [s] and poses (1, 3) of a robot that follows a share of a command and brakes, by a naive twin."""
+    px = py = yaw = time = 0.0
+    kept, dt = 1.0, 0.01
+    while kept > 0.0:
+        px, py = px + kept * v * dt * math.cos(yaw), py + kept * v * dt * math.sin(yaw)
+        yaw, time = yaw + kept * wz * dt, time + dt
+        kept = max(share if time <= LIMITS.reaction_time else 0.0, kept - LIMITS.decel_lim_x / v * dt)
+        yield time, np.array([[px, py, yaw]])
+
+
 @given(st.floats(0.31, 1.0), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(0.01, 0.3), st.floats(-1.0, 1.0))
 @settings(max_examples=150, deadline=None)
 def test_above_the_passing_speed_nobody_who_sets_off_is_touched(v, x, y, pace, wz):
@@ -247,15 +258,22 @@ def test_above_the_passing_speed_nobody_who_sets_off_is_touched(v, x, y, pace, w
     assert share * v >= 0.3 - 1e-9
     if share * v <= 0.3 + 1e-9:
         return
-    px = py = yaw = time = 0.0
-    kept, dt = 1.0, 0.01
-    while kept > 0.0:
-        px, py = px + kept * v * dt * math.cos(yaw), py + kept * v * dt * math.sin(yaw)
-        yaw, time = yaw + kept * wz * dt, time + dt
-        slowed = LIMITS.decel_lim_x / v * dt
-        kept = max(share if time <= LIMITS.reaction_time else 0.0, kept - slowed)
-        gap = float(CARRIER.gaps(np.array([[px, py, yaw]]), np.array([[[x, y]]]), np.array([0.25]))[0, 0])
+    for time, pose in braked(share, v, wz):
+        gap = float(CARRIER.gaps(pose, np.array([[[x, y]]]), np.array([0.25]))[0, 0])
         assert gap > pace * time, f"share {share}: they reach it after {time:.2f} s"
+
+
+@given(st.floats(0.31, 1.0), st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(0.1, 0.6), st.floats(-1.0, 1.0))
+@settings(max_examples=150, deadline=None)
+def test_above_the_passing_speed_nobody_who_turns_on_the_spot_first_is_touched(v, x, y, half_length, wz):
+    """They are known by half of their length; their corners sweep a circle larger by no more than the margin."""
+    known, circle = replace(waiting(x, y), radius=half_length), np.array([half_length + LIMITS.contact_margin])
+    share = share_of(Twist.planar(v, 0.0, wz), known, box=CARRIER)
+    if share * v <= 0.3 + 1e-9:
+        return
+    for time, pose in braked(share, v, wz):
+        gap = float(CARRIER.gaps(pose, np.array([[[x, y]]]), circle)[0, 0])
+        assert gap > 0.0, f"share {share}: a corner reaches it after {time:.2f} s"
 
 
 def test_the_same_question_has_the_same_answer():
