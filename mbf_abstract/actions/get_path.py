@@ -2,22 +2,27 @@
 
 Steps of one goal: check names and frames - start pose - map kept alive - plugin under patience and retries, and the
 ``fallback_planner`` where that finds no path - the path is checked and transformed - result. The robot never moves.
+
+A robot that finds no path, and hears of others that may leave, plans once more on the map without them. It announces
+that path as its wish (``mbf_abstract.traffic``), so that they can meet; the result has none.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from mbf_abstract.actions.action import GoalJob
+from mbf_abstract.actions.meetings import those_that_leave
 from mbf_abstract.actions.plugin_action import PluginAction
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.plan_check import area_in_global_frame, in_global_frame, path_result
 from mbf_abstract.execution.planner import FALLBACK_OUTCOMES, PlannerExecution
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.arrival_tolerance import plan_tolerance_problem
 from mbf_abstract.goals.feedback_types import NoFeedback
@@ -27,6 +32,10 @@ from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.goals.result_types import GetPathResult
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PluginKind
+from mbf_abstract.traffic.announcement import Announcement
+
+BESIDE_BODY = 0.1
+"""The sensed body of another robot lies at most this far [m] outside of the one that it announces."""
 
 Handle = GoalHandle[GetPathGoal, GetPathResult, NoFeedback]
 Job = GoalJob[GetPathGoal, GetPathResult, NoFeedback]
@@ -65,10 +74,19 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         except (TransformError, RobotStateError) as error:
             return GetPathResult(GetPathOutcome.TF_ERROR, str(error), planner=plugin.name)
         job.report_started(plugin=plugin.name)
-        # 3. Plan; where there is no path for this planner there may be one for the other.
+        result = self._best_plan(job, plugin, request, area)
+        # 5. A robot that finds no path from where it is asks others to leave it one.
+        if handle.goal.start_pose is None:
+            self._announce_wish(job, result, request, area)
+        return result
+
+    def _best_plan(
+        self, job: Job, plugin: LoadedPlugin[AbstractPlanner], request: PlanRequest, area: GoalArea | None
+    ) -> GetPathResult:
+        """3. Plan; where there is no path for this planner there may be one for the other."""
         fallback = self._fallback_of(plugin)
         first = self._plan(job, plugin, request, area, has_fallback=bool(fallback))
-        if not fallback or first.is_final or first.outcome not in FALLBACK_OUTCOMES or handle.cancel_requested:
+        if not fallback or first.is_final or first.outcome not in FALLBACK_OUTCOMES or job.handle.cancel_requested:
             return first
         if problem := self._plugins.problem(self.kind, fallback):
             return replace(first, message=f"{first.message}; fallback_planner: {problem}")
@@ -103,6 +121,40 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
             numbers = {"cost": result.cost, "length": result.path.length, "poses": len(result.path)}
             self.runtime.events.emit(EventKind.PLAN, self.name, goal_id=handle.id, plugin=plugin.name, **numbers)
         return result
+
+    def _announce_wish(self, job: Job, result: GetPathResult, request: PlanRequest, area: GoalArea | None) -> None:
+        """Announce the path that there would be without the robots that may leave; none, if this is of no use."""
+        runtime = self.runtime
+        if runtime.gate.holder:  # one that drives announces the path that it follows
+            return
+        others = those_that_leave(runtime) if result.plugin_outcome in FALLBACK_OUTCOMES and not result.is_final else ()
+        wish = self._plan_without(others, job, result.planner, request, area) if others else None
+        if wish is not None:
+            text = f"there would be a path of {wish.length:.2f} m without {', '.join(one.name for one in others)}"
+            runtime.events.emit(EventKind.CUSTOM, self.name, goal_id=job.handle.id, message=text)
+        runtime.traffic.wish(wish)
+
+    def _plan_without(
+        self,
+        others: Sequence[Announcement],
+        job: Job,
+        planner: str,
+        request: PlanRequest,
+        area: GoalArea | None,
+    ) -> Path | None:
+        """The path that a planner finds while the map does not know of some robots; None if there is none."""
+        frame, hooks = self.runtime.parameters.global_frame, self.runtime.map_hooks
+        places = [
+            (Pose.planar(x, y, z=z, frame_id=frame), 2.0 * (one.radius + BESIDE_BODY))
+            for one in others
+            for x, y, z in [one.path[0].tolist()]
+        ]
+        run = self._supervise(job, self._plugins.get(self.kind, planner))
+        with run, run.map_in_use():
+            run.call_beside("the map's forget()", partial(hooks.forget, places))
+            execution = PlannerExecution(run, request, area, max_retries=0)
+            judge = partial(path_result, execution.execute(), None, request, self.runtime, planner, area)
+            return run.call_beside("the map's path_problem()", judge).path
 
     def _request(self, handle: Handle) -> PlanRequest:
         def to_global(pose: Pose) -> Pose:

@@ -1,5 +1,7 @@
 """Whether a blocked robot meets other robots: which failures that causes, how near their paths come, what is run then.
 
+A robot without a path meets nobody: ``get_path`` then asks whom it may wait for, ``those_that_leave``.
+
 Nobody has to configure it. A robot that announces its path and has loaded a recovery named ``give_way`` runs that one,
 at the distance that ``give_way`` keeps. ``right_of_way_behavior`` names another one or none.
 """
@@ -10,6 +12,7 @@ from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.plugin_table import PluginTable
+from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.right_of_way import MEETING_LENGTH
 
 USUAL_NAME = "give_way"
@@ -58,6 +61,15 @@ def meets_others(runtime: Runtime, plugins: PluginTable) -> bool:
     """Whether the robot meets robots that announce their paths."""
     distance = meeting_distance(runtime, plugins)
     return bool(runtime.traffic.rivals(runtime.clock.now(), distance, MEETING_LENGTH))
+
+
+def those_that_leave(runtime: Runtime) -> tuple[Announcement, ...]:
+    """Robots that a robot without a path may wait for: those that go somewhere, those that make room.
+
+    The body of one that does not announce its size cannot be taken off a map, so it is none of them.
+    """
+    others = [other for other in runtime.traffic.others(runtime.clock.now()) if other.radius > 0.0]
+    return tuple(one for one in others if one.remaining > 0.0 or (one.makes_room and not one.cannot_yield))
 
 
 def distance_of_meetings(runtime: Runtime, plugins: PluginTable) -> float:

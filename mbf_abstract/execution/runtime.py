@@ -58,6 +58,9 @@ class MapHooks(Protocol):
     def avoid(self, places: Sequence[AvoidedPlace]) -> None:
         """Close these places on all maps, and open those that were closed before."""
 
+    def forget(self, places: Sequence[tuple[Pose, float]]) -> None:
+        """Free squares around places, of a side [m] each, on the map of plans, until sensors see what stands there."""
+
     def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
         """Keep the map alive while a goal of this kind runs."""
 

@@ -8,8 +8,8 @@ update: no user sees the map of the last stop.
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any, Generic, TypeVar
 
 from mbf_abstract.drive.robot import RobotStateError
@@ -102,6 +102,14 @@ class ServedMap(Generic[Map]):
             self._report_floor()
         for event in self._motions.changes(self.tracked_objects()):
             self._runtime.events.emit(EventKind.OBJECT, self.name, **event)
+
+    def forget(self, places: Sequence[tuple[Pose, float]]) -> None:
+        """Free squares around places, of a side [m] each, of what sensors have seen there, until they see it again."""
+        for place, size in places:
+            with suppress(TransformError):
+                self.map.clear_area(self._runtime.transforms.transform_pose(place, self.map.frame_id), size)
+        with suppress(Exception):  # a layer that raises makes the map stale, which it says itself
+            self.update()
 
     def _report_floor(self) -> None:
         """Note a new floor, and what is suspicious on it."""

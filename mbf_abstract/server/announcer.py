@@ -16,25 +16,27 @@ from mbf_abstract.actions.meetings import distance_of_meetings
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.execution.plan_check import path_in_global_frame
+from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.goals.goal_status import GoalStatus
+from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.server.making_room import MakingRoom
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
-from mbf_abstract.traffic.announcement import Announcement
+from mbf_abstract.traffic.announcement import DIGITS, Announcement
 from mbf_abstract.traffic.traffic import Channel
 
 LENGTH = 12.0
 """How much of its path [m] a robot announces."""
 IDLE_TIME = 2.0
 """A robot without a goal for this long [s] goes nowhere; executives send one goal after the other."""
-DIGITS = 2
-"""Of the length that remains [m], so that small differences decide nothing."""
 
 
 class Announcer:
     """Publishes for one server: the path that ``exe_path`` follows, and in recoveries the one that it has followed.
 
-    A robot without a goal also makes room for others that ask, see ``making_room``.
+    A robot without a path announces what it wishes, see ``Traffic.wish``, until it follows another path, or its goal is
+    over. A robot without a goal also makes room for others that ask, see ``making_room``.
 
     Parameters
     ----------
@@ -47,10 +49,13 @@ class Announcer:
     def __init__(self, server: AbstractNavigationServer, name: str, channel: Channel) -> None:
         self._server = server
         self._goal_id: int | None = None
+        self._wished: Path | None = None
         self._tracker: PathTracker | None = None
         self._busy = -math.inf
         server.runtime.traffic.connect(name, channel)
         self._making_room = MakingRoom(server)
+        for action in (server.move_base, server.recovery):
+            action.listeners.append(self._end_wish)
 
     def announce(self) -> None:
         """Publish the present state; does nothing while the robot does not know where it is."""
@@ -80,11 +85,15 @@ class Announcer:
         self._making_room.act(pose)
 
     def _take_path(self, now: float) -> None:
-        """Keep up with the newest goal of ``exe_path``; without goals that drive, forget its path after a while."""
-        server = self._server
+        """Keep up with wishes and the newest goal of ``exe_path``; without goals that drive, forget after a while."""
+        server, traffic = self._server, self._server.runtime.traffic
+        if traffic.wished is not self._wished:
+            self._wished, self._busy = traffic.wished, now
+            self._tracker = None if self._wished is None else PathTracker(self._wished)
         goals = server.exe_path.unfinished
         if goals and goals[-1].id != self._goal_id:
             self._goal_id = goals[-1].id
+            traffic.wished = self._wished = None
             try:
                 self._tracker = PathTracker(path_in_global_frame(goals[-1].goal.path, server.runtime))
             except TransformError:
@@ -92,4 +101,9 @@ class Announcer:
         if any(action.busy for action in (server.exe_path, server.recovery, server.move_base)):
             self._busy = now
         elif now - self._busy >= IDLE_TIME:
-            self._tracker = None
+            traffic.wished = self._wished = self._tracker = None
+
+    def _end_wish(self, handle: AnyGoalHandle) -> None:
+        """End what a robot wishes with its goal: that of ``move_base``, or of an executive, which cancels what runs."""
+        if handle.action == self._server.move_base.name or handle.status is GoalStatus.CANCELED:
+            self._server.runtime.traffic.wish(None)

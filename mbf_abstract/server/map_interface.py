@@ -173,6 +173,9 @@ class MapInterface(PluginHost):
     def avoid(self, places: Sequence[AvoidedPlace]) -> None:
         """Close these places for plans and controllers, and open those that were closed before; nothing here."""
 
+    def forget(self, places: Sequence[tuple[Pose, float]]) -> None:
+        """Free squares around places, of a side [m] each, on the map of plans until sensors see anew; nothing here."""
+
     def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
         """Keep the map alive while a goal of this kind runs."""
         return nullcontext()

@@ -1,7 +1,6 @@
 """A server on maps: scans, questions, freshness, changes at run time, written once for every backend.
 
-A backend's server derives ``MapServer``, builds its maps in ``serve_maps`` and hands them to plugins in
-``make_context``.
+A backend's server derives ``MapServer``, builds its maps in ``serve_maps``, hands them to plugins in ``make_context``.
 """
 
 from __future__ import annotations
@@ -155,10 +154,7 @@ class MapServer(AbstractNavigationServer):
         return within_speed_limit(maps, self.runtime.transforms, pose, answer, full_speed)
 
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
-        """What the robot would touch on the map that it drives on; see ``NavigationMap.obstacle_ahead``.
-
-        Raises TransformError where the pose is not known on that map.
-        """
+        """What the robot would touch on the map that it drives on; TransformError where the pose is not known on it."""
         navigation_map = self.local_map.map
         there = self.runtime.transforms.transform_pose(pose, navigation_map.frame_id)
         return str(navigation_map.obstacle_ahead(there, command, duration))
@@ -174,6 +170,10 @@ class MapServer(AbstractNavigationServer):
                 served.map.avoid(there)
                 with suppress(Exception):  # a layer that raises makes the map stale, which it says itself
                     served.update()
+
+    def forget(self, places: Sequence[tuple[Pose, float]]) -> None:
+        """Free squares around places, of a side [m] each, on the map that plans are made on, until sensors see anew."""
+        self.global_map.forget(places)
 
     @contextmanager
     def using_map(self, kind: PluginKind) -> Iterator[None]:

@@ -10,6 +10,8 @@ import numpy as np
 from mbf_abstract.geometry import FARTHEST_COORDINATE, FloatArray
 from mbf_abstract.geometry.arithmetic import norm
 
+DIGITS = 2
+"""Of the length that remains [m], so that small differences decide nothing."""
 SPACING = 0.1
 """Distance [m] of the points at which two paths are compared."""
 LONGEST_PATH = 1e5
@@ -43,6 +45,8 @@ class Announcement:
         Whether it is blocked and waits for those that make room near its path.
     distance : float
         From its own path to that of a robot like this one [m] at which they do not meet; 0 = not known.
+    wishes : bool
+        Whether it has found no path, and ``path`` is the one that there would be without the robots in its way.
     """
 
     name: str
@@ -55,6 +59,7 @@ class Announcement:
     makes_room: bool = False
     asks: bool = False
     distance: float = 0.0
+    wishes: bool = False
 
     def to_json(self) -> str:
         """Return it as a JSON object, to be sent; ``from_json`` reads it."""
@@ -75,9 +80,10 @@ class Announcement:
                 bool(values["cannot_yield"]),
                 int(values["waits"]),
                 float(values["radius"]),
-                bool(values.get("makes_room", False)),  # robots with an older version do not send these three
+                bool(values.get("makes_room", False)),  # robots with an older version do not send these four
                 bool(values.get("asks", False)),
                 float(values.get("distance", 0.0)),
+                bool(values.get("wishes", False)),
             )
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise ValueError(f"no announcement of a robot: {type(error).__name__}: {error}") from error

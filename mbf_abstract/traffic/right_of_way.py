@@ -13,6 +13,8 @@ yields drives forward, or the other one plans a detour. Only a wait in vain, or 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mbf_abstract.geometry.arithmetic import norm
@@ -70,12 +72,24 @@ def stands_in_the_way(standing: Announcement, traveller: Announcement, distance:
     """Whether a robot without a goal stands ahead of another, nearer to its path than ``distance`` [m].
 
     Both compute it: the traveller, to know whom it may wait for, and the one that stands, to know that it is asked.
-    How far the traveller looks is ``MEETING_LENGTH`` for both.
+    How far the traveller looks is ``MEETING_LENGTH`` for both; one without a path does not come nearer, and looks as
+    far as it announces.
     """
-    near = paths_conflict(standing, traveller, distance, MEETING_LENGTH)
-    return near and _is_ahead(standing, traveller, MEETING_LENGTH)
+    length = math.inf if traveller.wishes else MEETING_LENGTH
+    return paths_conflict(standing, traveller, distance, length) and _is_ahead(standing, traveller, length)
 
 
 def _is_ahead(robot: Announcement, traveller: Announcement, length: float) -> bool:
     """Whether a robot is nearer to a later point of the traveller's path than to where the traveller is."""
     return int(np.argmin(norm(traveller.points_ahead(length) - robot.path[0]))) > 0
+
+
+def is_rival(own: Announcement, other: Announcement, distance: float, length: float) -> bool:
+    """Whether another robot is one of ``Traffic.rivals``, where they meet nearer than ``distance`` [m]."""
+    if own.makes_room:
+        return other.asks and stands_in_the_way(own, other, distance)
+    if other.makes_room:
+        return not other.cannot_yield and stands_in_the_way(other, own, distance)
+    ahead = math.inf if own.wishes or other.wishes else length
+    meets = other.remaining > 0.0 and paths_conflict(own, other, distance, ahead)
+    return meets and face_each_other(own, other, ahead)

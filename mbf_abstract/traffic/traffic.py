@@ -12,10 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from mbf_abstract.geometry import FloatArray
+import numpy as np
+
+from mbf_abstract.geometry import FloatArray, Path
 from mbf_abstract.geometry.arithmetic import norm
-from mbf_abstract.traffic.announcement import Announcement
-from mbf_abstract.traffic.right_of_way import distance_between, face_each_other, paths_conflict, stands_in_the_way
+from mbf_abstract.traffic.announcement import DIGITS, Announcement
+from mbf_abstract.traffic.right_of_way import distance_between, is_rival
 
 MAX_AGE = 3.0
 """A robot that announces nothing new for this long [s] does not count: it is switched off, or out of reach."""
@@ -102,12 +104,15 @@ class Traffic:
         Whether it is letting others pass: then it announces where it is, and not where it wants to go.
     asks : bool
         As it is announced; see ``ask``.
+    wished : Path or None
+        What the robot would follow, see ``wish``.
     """
 
     def __init__(self) -> None:
         self.own: Announcement | None = None
         self.yields = False
         self.asks = False
+        self.wished: Path | None = None
         self._name = ""
         self._channel: Channel | None = None
         self._meeting: Meeting | None = None
@@ -154,11 +159,29 @@ class Traffic:
     def _publish(self, announcement: Announcement) -> None:
         if self._channel is None:
             return
-        own, meeting = replace(announcement, name=self._name, asks=self.asks), self._meeting
+        own = replace(announcement, name=self._name, asks=self.asks, wishes=self.wished is not None)
+        meeting = self._meeting
         if meeting is not None and own.remaining > 0.0:  # one that has arrived has nothing left
             own = replace(own, remaining=meeting.remaining, cannot_yield=meeting.cannot_yield, waits=meeting.waits)
         self.own = own
         self._channel.publish(replace(own, path=own.path[:1]) if self.yields else own)
+
+    def wish(self, path: Path | None) -> None:
+        """Announce at once the path that a robot without one would follow if the others left; None = none any more.
+
+        It counts as a path for everybody, until the robot follows another one or its goal is over.
+        """
+        before, self.wished, own = self.wished, path, self.own
+        if own is None or path is before:
+            return
+        place = own.path[:1]
+        if path is None:
+            self._publish(replace(own, path=place, remaining=0.0))
+            return
+        if self._is_another(path.positions[-1]):
+            self._meeting = None
+        own = replace(own, path=np.concatenate([place, path.positions]), makes_room=False, cannot_yield=False)
+        self._publish(replace(own, remaining=round(own.length, DIGITS)))
 
     # ----------------------------------------------------------------------------------------------- a meeting
     def meet(self, now: float, distance: float, length: float) -> tuple[Announcement, ...]:
@@ -216,19 +239,11 @@ class Traffic:
             [s]
         distance, length : float
             Their paths come nearer than ``distance`` [m] over the next ``length`` [m] of both; for a robot that
-            announces another distance, nearer than ``distance_between`` says.
+            announces another distance, nearer than ``distance_between`` says. Where one of two wishes, it is over all
+            that they announce: it has seen the other one from afar, and does not come nearer.
         """
         own = self.own
         if own is None:
             return ()
         others = self.others(now)
-        return tuple(other for other in others if _is_rival(own, other, distance_between(distance, other), length))
-
-
-def _is_rival(own: Announcement, other: Announcement, distance: float, length: float) -> bool:
-    if own.makes_room:
-        return other.asks and stands_in_the_way(own, other, distance)
-    if other.makes_room:
-        return not other.cannot_yield and stands_in_the_way(other, own, distance)
-    meets = other.remaining > 0.0 and paths_conflict(own, other, distance, length)
-    return meets and face_each_other(own, other, length)
+        return tuple(other for other in others if is_rival(own, other, distance_between(distance, other), length))

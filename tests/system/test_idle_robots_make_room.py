@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 import mbf_abstract
+from mbf_abstract.events import EventKind
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from terrain.physics.incidents import CONTACTS
 from terrain.scenarios.places import PlanarPose
@@ -64,20 +65,26 @@ def fleet(request, tmp_path):
         one.close()
 
 
-def drive_through(fleet):
+def drive_through(fleet, recovery_behaviors=None):
     anna = fleet.sessions["anna"]
-    return anna.navigator.send(MoveBaseGoal(anna.goals[0])).wait()
+    return anna.navigator.send(MoveBaseGoal(anna.goals[0], recovery_behaviors=recovery_behaviors)).wait()
+
+
+def recoveries_of(session):
+    return [event.data["plugin"] for event in session.memory.events if event.kind is EventKind.RECOVERY]
 
 
 def contacts(fleet):
     return [one for session in fleet.sessions.values() for one in session.simulation.incidents if one.kind in CONTACTS]
 
 
+@pytest.mark.parametrize("recoveries", [None, ()], ids=["all recoveries", "nothing clears"])
 @pytest.mark.parametrize("x", [3.6, 7.0])
-def test_it_pulls_out_touches_nobody_and_comes_back(fleet, x):
+def test_it_pulls_out_touches_nobody_and_comes_back(fleet, x, recoveries):
     made = fleet(x)
-    result, ben = drive_through(made), made.sessions["ben"]
+    result, ben = drive_through(made, recoveries), made.sessions["ben"]
     assert result.success, result.message
+    assert recoveries_of(made.sessions["anna"])[0] == "give_way", "it asks, before it forgets who stands there"
     made.clock.sleep(40.0)
     track = ben.recorder.finish().poses[:, :2]
     assert np.linalg.norm(track - [x, 2.0], axis=1).max() > 0.6, "it pulled out"
