@@ -1,7 +1,8 @@
 """The ``get_path`` action: from a start and a target pose to a path in the global frame.
 
-Steps of one goal: check names and frames - start pose - map kept alive - plugin under patience and retries, and the
-``fallback_planner`` where that finds no path - the path is checked and transformed - result. The robot never moves.
+Steps of one goal: check names and frames - start pose - map kept alive, and seen again where it was cleared - plugin
+under patience and retries, and the ``fallback_planner`` where that finds no path - the path is checked and
+transformed - result. The robot never moves.
 
 A robot that finds no path, and hears of others that may leave, plans once more on the map without them. It announces
 that path as its wish (``mbf_abstract.traffic``), so that they can meet; the result has none.
@@ -22,6 +23,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.plan_check import area_in_global_frame, in_global_frame, path_result
 from mbf_abstract.execution.planner import FALLBACK_OUTCOMES, PlannerExecution
+from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.arrival_tolerance import plan_tolerance_problem
@@ -36,6 +38,8 @@ from mbf_abstract.traffic.announcement import Announcement
 
 BESIDE_BODY = 0.1
 """The sensed body of another robot lies at most this far [m] outside of the one that it announces."""
+
+SCAN_CHECK = 0.05  # s; how often a plan that waits for a scan looks for it
 
 Handle = GoalHandle[GetPathGoal, GetPathResult, NoFeedback]
 Job = GoalJob[GetPathGoal, GetPathResult, NoFeedback]
@@ -112,6 +116,7 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
             if missing := run.call_beside("the map's missing_floor()", self.runtime.map_hooks.missing_floor):
                 # permanent: no recovery brings a map
                 return GetPathResult(GetPathOutcome.MAP_ERROR, missing, planner=plugin.name, permanent=True)
+            self._await_scans(run)
             execution = PlannerExecution(run, request, area, has_fallback, handle.goal.max_retries)
             end = execution.execute()
             # 4. Check the path of a plugin that reports success.
@@ -121,6 +126,12 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
             numbers = {"cost": result.cost, "length": result.path.length, "poses": len(result.path)}
             self.runtime.events.emit(EventKind.PLAN, self.name, goal_id=handle.id, plugin=plugin.name, **numbers)
         return result
+
+    def _await_scans(self, run: PluginRun[AbstractPlanner]) -> None:
+        """Wait until a cleared map has seen again what stands there; not on a cancel, nor for a silent sensor."""
+        while not run.canceled and run.call_beside("the map's awaits_scan()", self.runtime.map_hooks.awaits_scan):
+            self.runtime.clock.sleep(SCAN_CHECK)
+            run.patience_watch.restart()  # patience is with the planner
 
     def _announce_wish(self, job: Job, result: GetPathResult, request: PlanRequest, area: GoalArea | None) -> None:
         """Announce the path that there would be without the robots that may leave; none, if this is of no use."""

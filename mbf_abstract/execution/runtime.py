@@ -40,6 +40,9 @@ class MapHooks(Protocol):
     def floors_taken(self) -> int:
         """How many floors the map has taken up at run time; a plan of before is one on another floor."""
 
+    def awaits_scan(self) -> bool:
+        """Whether a plan should wait for the next scan, as its map was cleared; scans that have come are taken in."""
+
     def path_problem(self, path: Path) -> str:
         """Why the path of a planner, in the global frame, leads off the map; empty if it does not, or nobody knows."""
 

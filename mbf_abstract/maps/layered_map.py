@@ -89,6 +89,10 @@ class LayeredMap(NavigationMap):
         """Why the map is not current at ``now`` [s]: a layer that raised, or a silent sensor; empty if it is."""
         return self.layers.stale_reason(now)
 
+    def awaits_scan(self, now: float) -> bool:
+        """Whether any layer does, see ``MapLayer.awaits_scan``."""
+        return any(layer.awaits_scan(now) for layer in self.layers.enabled)
+
     def configuration_warnings(self) -> list[str]:
         """Legal but suspicious parameters of the layers, a text each."""
         return self.layers.configuration_warnings()

@@ -141,7 +141,7 @@ class MapQueries:
     def clear_map(self, local: bool | None = None) -> None:
         """Forget what sensors have marked, and update the maps, the local one first.
 
-        A plan made before the next scan may lead through what is still there. Nothing drives until that scan.
+        A plan waits for the next scans, no longer than a sensor may be silent. Nothing drives until they have come.
 
         ``local`` chooses the local or the global map only; None = both.
         """

@@ -56,11 +56,12 @@ class NavigationMap(ABC):
         """Why no command may be computed on the map at ``now`` [s]; empty if it is fresh."""
         return ""
 
-    def update(self, robot_pose: Pose | None, now: float) -> object:
-        """Bring the map up to ``now`` [s], and end overrides of layer parameters that are over.
+    def awaits_scan(self, now: float) -> bool:
+        """Whether a plan should wait, as a sensor has sent nothing since a clearing and may still do so in time."""
+        return False
 
-        ``robot_pose`` is None while it is unknown.
-        """
+    def update(self, robot_pose: Pose | None, now: float) -> object:
+        """Bring the map up to ``now`` [s], end overrides that are over; ``robot_pose`` is None while it is unknown."""
         return None
 
     # ------------------------------------------------------------------------------------------------- sensors

@@ -111,6 +111,13 @@ class ServedMap(Generic[Map]):
         with suppress(Exception):  # a layer that raises makes the map stale, which it says itself
             self.update()
 
+    def awaits_scan(self) -> bool:
+        """Whether the map waits for what its sensors see since it was cleared; scans that have come are taken in."""
+        if self.map.awaits_scan(self._runtime.clock.now()):
+            with suppress(Exception):  # a layer that raises makes the map stale, which it says itself
+                self.update()
+        return self.map.awaits_scan(self._runtime.clock.now())
+
     def _report_floor(self) -> None:
         """Note a new floor, and what is suspicious on it."""
         self._runtime.events.emit(EventKind.MAP, self.name, message=f"{self.name}: a new floor has come")

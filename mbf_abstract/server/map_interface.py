@@ -150,6 +150,10 @@ class MapInterface(PluginHost):
         """Why the map must not be driven on right now; empty = it is current."""
         return ""
 
+    def awaits_scan(self) -> bool:
+        """Whether a plan should wait for the next scan, as its map was cleared; scans that have come are taken in."""
+        return False
+
     def path_problem(self, path: Path) -> str:
         """Why the path of a planner, in the global frame, leads off the map; empty if it does not, or nobody knows."""
         return ""

@@ -115,12 +115,13 @@ class MapServer(AbstractNavigationServer):
         return int(self.global_map.map.floors_taken)
 
     def map_problem(self, name: str = "") -> str:
-        """Why a map is stale, by default the one that the robot drives on; empty while it is fresh.
-
-        Plans are made on a stale map, too. Raises ServerError if there is no map of that name.
-        """
+        """Why a map, by default the one driven on, is stale; plans are made on it, too. ServerError: no such map."""
         served = self._served(name) if name else self.local_map
         return str(served.map.stale_reason(self.runtime.clock.now()))
+
+    def awaits_scan(self) -> bool:
+        """Whether the map that plans are made on does, see ``ServedMap.awaits_scan``."""
+        return self.global_map.awaits_scan()
 
     def path_problem(self, path: Path) -> str:
         """Where a path leaves the map that plans are made on; empty if it does not, or that is not known."""
@@ -161,12 +162,10 @@ class MapServer(AbstractNavigationServer):
 
     def avoid(self, places: Sequence[AvoidedPlace]) -> None:
         """Close these places on all maps, and no others; a map whose frame is not known to them stays as it is."""
+        transform = self.runtime.transforms.transform_pose
         for served in self.served.values():
             with suppress(TransformError):
-                there = [
-                    replace(place, centre=self.runtime.transforms.transform_pose(place.centre, served.map.frame_id))
-                    for place in places
-                ]
+                there = [replace(one, centre=transform(one.centre, served.map.frame_id)) for one in places]
                 served.map.avoid(there)
                 with suppress(Exception):  # a layer that raises makes the map stale, which it says itself
                     served.update()

@@ -12,12 +12,14 @@ source that is silent for longer than its ``expected_update_rate`` makes the map
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer import LayerParameters
-from mbf_abstract.maps.layers.source_watch import first_reason
+from mbf_abstract.maps.layers.source_watch import SourceWatch
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import FREE, LETHAL, CellArray, CellBox
@@ -64,9 +66,9 @@ class ObstacleLayer(GridLayer):
         """Take over the outline under which the map is free: without padding, where the robot does not reach."""
         self._footprint = unpadded
 
-    def stale_reason(self, now: float) -> str:
-        """Name the source that is late at ``now`` [s]."""
-        return first_reason(buffer.stale_reason(now) for buffer in self.buffers.values())
+    def watched_sources(self) -> Iterator[tuple[SourceWatch, float]]:
+        """All sources, each with its limit."""
+        return ((buffer.watch, buffer.parameters.expected_update_rate) for buffer in self.buffers.values())
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Trace the rays of all observations, mark hits, free the cells under the robot; report the touched box."""

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer import LayerParameters
-from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
+from mbf_abstract.maps.layers.source_watch import SourceWatch
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
@@ -95,12 +96,10 @@ class RangeSensorLayer(CostmapLayer):
         self.watches[scan.source].heard(scan.stamp)
         self._waiting.append(scan)
 
-    def stale_reason(self, now: float) -> str:
-        """Name the sensor that is late at ``now`` [s]."""
+    def watched_sources(self) -> Iterator[tuple[SourceWatch, float]]:
+        """All sensors, each with its limit."""
         sources = self.parameters.sources
-        return first_reason(
-            watch.stale_reason(now, sources[name].expected_update_rate) for name, watch in self.watches.items()
-        )
+        return ((watch, sources[name].expected_update_rate) for name, watch in self.watches.items())
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Update the beliefs with the queued readings."""

@@ -81,10 +81,6 @@ class ObservationBuffer:
             scan for scan in seen if earliest <= scan.stamp and (scan is seen[-1] or scan.stamp <= now + MAX_STAMP_LEAD)
         ]
 
-    def stale_reason(self, now: float) -> str:
-        """Why the source is stale at ``now`` [s]; empty while it is fresh."""
-        return self.watch.stale_reason(now, self.parameters.expected_update_rate)
-
     def forget(self) -> None:
         """Drop the kept observations, e.g. because the map is cleared."""
         with self._lock:

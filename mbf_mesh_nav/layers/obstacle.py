@@ -15,6 +15,7 @@ Cost: two tree queries a point, about 2 microseconds.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 from pydantic import field_validator
 
 from mbf_abstract.geometry.arithmetic import norm
-from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
+from mbf_abstract.maps.layers.source_watch import SourceWatch
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray, sorted_once
@@ -184,12 +185,15 @@ class ObstacleLayer(MeshLayer):
 
     def stale_reason(self, now: float) -> str:
         """Which sensor is silent for longer than ``expected_update_rate``, or has sent nothing since a clearing."""
-        limit = self.parameters.expected_update_rate
-        sources = self.parameters.sources or tuple(self._watches)
-        if limit > 0.0 and not sources:
+        if self.parameters.expected_update_rate > 0.0 and not self.parameters.sources and not self._watches:
             return "no observation source has sent anything yet"
+        return super().stale_reason(now)
+
+    def watched_sources(self) -> Iterator[tuple[SourceWatch, float]]:
+        """The sources that the layer requires, else all that have sent something, with one limit."""
+        sources = self.parameters.sources or tuple(self._watches)
         watches = (self._watches.get(source, SourceWatch(source)) for source in sources)
-        return first_reason(watch.stale_reason(now, limit) for watch in watches)
+        return ((watch, self.parameters.expected_update_rate) for watch in watches)
 
     @property
     def source_names(self) -> tuple[str, ...]:

@@ -20,6 +20,10 @@ def takes_clearing_for_news(server):
     server.map_problem = lambda: "" if "since it was cleared" in problem() else problem()
 
 
+def plans_on_cleared_maps(server):
+    server.awaits_scan = lambda: False
+
+
 class NeverStale:
     """A map that is never stale, and else as the one it stands for."""
 
@@ -134,6 +138,7 @@ FAULTS = {
     },
     refines_by_straight_lines: {"a_refined_path_costs_no_more"},
     takes_clearing_for_news: {"a_cleared_map_is_not_driven_on_until_it_sees_again"},
+    plans_on_cleared_maps: {"a_plan_after_a_clearing_knows_what_is_seen"},
     drives_recoveries_on_silent_maps: {"a_silent_sensor_holds_a_recovery"},
     swallows_unknown_sources: {"an_unknown_source_is_reported_once"},
     places_scans_by_the_newest_transform: {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import exp
 from mbf_abstract.maps.layers.inflation import InflationRadii
 from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
-from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
+from mbf_abstract.maps.layers.source_watch import SourceWatch
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 
@@ -72,10 +73,9 @@ class ObstacleLayer(MapLayer):
         for watch in self._watches.values():
             watch.cleared()
 
-    def stale_reason(self, now: float) -> str:
-        """Which sensor is silent, or has sent nothing since the layer was cleared."""
-        limit = self.parameters.expected_update_rate
-        return first_reason(watch.stale_reason(now, limit) for watch in self._watches.values())
+    def watched_sources(self) -> Iterator[tuple[SourceWatch, float]]:
+        """All sensors, with one limit."""
+        return ((watch, self.parameters.expected_update_rate) for watch in self._watches.values())
 
 
 class InflationParameters(LayerParameters, InflationRadii):

@@ -7,9 +7,11 @@ What a layer computes depends on its map, so a map derives its own interface fro
 from __future__ import annotations
 
 from abc import ABC
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -62,9 +64,17 @@ class MapLayer(ABC):
         Called on the thread of the sensor, also while the map is being updated; must be quick.
         """
 
+    def watched_sources(self) -> Iterable[tuple[SourceWatch, float]]:
+        """The sources whose freshness is watched, and how long [s] each may be silent, 0 = for ever; here none."""
+        return ()
+
     def stale_reason(self, now: float) -> str:
-        """Why the layer's data are too old at ``now`` [s]; empty while they are fresh, or if it has none."""
-        return ""
+        """Why the layer's data are too old at ``now`` [s]: which source is late; empty while they are fresh."""
+        return first_reason(watch.stale_reason(now, limit) for watch, limit in self.watched_sources())
+
+    def awaits_scan(self, now: float) -> bool:
+        """Whether a source that has sent nothing since the layer was cleared may still do so in time."""
+        return any(watch.awaits_scan(now, limit) for watch, limit in self.watched_sources())
 
     def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
         """The objects that the layer follows, at ``now`` [s]; none if it follows none."""

@@ -28,6 +28,7 @@ class SourceWatch:
         self.name = name
         self._last: float | None = None
         self._in_map = False
+        self._before_clearing: float | None = None  # stamp of the last observation of which the map lost something
 
     def heard(self, stamp: float) -> None:
         """Note an observation made at ``stamp`` [s]."""
@@ -35,11 +36,20 @@ class SourceWatch:
 
     def used(self) -> None:
         """Note that an update has put an observation into the map."""
-        self._in_map = True
+        self._in_map, self._before_clearing = True, None
 
     def cleared(self) -> None:
         """Note that the map has lost what the source saw: it must not be driven on before the next scan."""
-        self._in_map = False
+        self._in_map, self._before_clearing = False, self._last
+
+    def awaits_scan(self, now: float, limit: float) -> bool:
+        """Whether nothing of it is in the map since it was cleared, and its next observation may come in time.
+
+        That is up to ``limit`` [s] after the last one before the clearing. Whoever waits longer may wait for ever, for
+        a sensor that has failed, or one whose observations a layer does not use.
+        """
+        before = self._before_clearing
+        return limit > 0.0 and before is not None and -MAX_STAMP_LEAD <= now - before <= limit
 
     def stale_reason(self, now: float, limit: float) -> str:
         """Why the source is stale at ``now`` [s] if it may be silent for ``limit`` [s], 0 = for ever; "" if fresh."""

@@ -1,11 +1,12 @@
 """Remove what the sensors have marked: everything, or around the robot, on one map or on all maps of a server.
 
-When to use: obstacles that have moved on are still in the map. When not: real obstacles; they come back with the next
-scan, but until then a planner may plan through them, so clear small areas first (list two instances).
+When to use: obstacles that have moved on are still in the map. When not: real obstacles; those in view come back with
+the next scan, those out of view do not, so clear small areas first (list two instances).
 
 With a radius, what no sensor would bring back stays: floor plan, keep-out areas. A static layer loses the area only if
-``layers`` names it; without a radius it is reset to its file. No controller drives until each sensor with an expected
-rate has sent a scan, as the obstacles may still be there.
+``layers`` names it; without a radius it is reset to its file. No plan is made and no controller drives until each
+sensor with an expected rate has sent a scan, as the obstacles may still be there. A plan waits no longer than a sensor
+may be silent; a controller does not drive before.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class ClearParameters(ChosenMapsParameters):
 
 
 class ClearRecovery(ChosenMapsRecovery):
-    """Clears layers and updates the maps, so that the next plan sees the result."""
+    """Clears layers and updates the maps; the next plan sees the result, and what the sensors see since."""
 
     Parameters: ClassVar[type[PluginParameters]] = ClearParameters
     parameters: ClearParameters

@@ -19,7 +19,7 @@ from pydantic import field_validator
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.layers.layer import MapLayer
-from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
+from mbf_abstract.maps.layers.source_watch import SourceWatch
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.maps.tracking.prediction import NOWHERE, Prediction, PredictionParameters, predict
@@ -81,11 +81,16 @@ class MovingObstacles:
     ----------
     frame_id : str
         Frame of the map.
+
+    Attributes
+    ----------
+    watches : dict of str to SourceWatch
+        How fresh each sensor is.
     """
 
     def __init__(self, parameters: MovingObstaclesParameters, frame_id: str) -> None:
         self._tracker = Tracker(parameters, frame_id)
-        self._watches = {name: SourceWatch(name) for name in parameters.sources}
+        self.watches = {name: SourceWatch(name) for name in parameters.sources}
         self._waiting: deque[RangeScan] = deque(maxlen=MAX_WAITING)
         self._lock = threading.Lock()  # of the tracker
         self._sensor = NOWHERE  # where the last scan was taken [m]
@@ -93,7 +98,7 @@ class MovingObstacles:
     def insert_scan(self, scan: RangeScan) -> None:
         """Keep a scan for the next update; may be called on any thread."""
         self._waiting.append(scan)
-        self._watches[scan.source].heard(scan.stamp)
+        self.watches[scan.source].heard(scan.stamp)
 
     def take_in(self, parameters: MovingObstaclesParameters, obstacle_points: ObstaclePoints) -> Iterator[Sighting]:
         """Follow the objects through the scans that wait, one after the other; yield what each has shown."""
@@ -107,7 +112,7 @@ class MovingObstacles:
             with self._lock:
                 numbers = self._tracker.insert(points, scan.origin, scan.stamp, rays)
                 of_moving = self._tracker.are_moving(numbers)
-            self._watches[scan.source].used()
+            self.watches[scan.source].used()
             self._sensor = scan.origin
             yield Sighting(points, of_moving)
 
@@ -139,10 +144,6 @@ class MovingObstacles:
         found = (predict(known, parameters, inscribed_radius, sensor, robot) for known in self.objects(now))
         return [prediction for prediction in found if len(prediction.costs)]
 
-    def stale_reason(self, now: float, limit: float) -> str:
-        """Which sensor is silent for longer than ``limit`` [s], or has sent nothing since a clearing."""
-        return first_reason(watch.stale_reason(now, limit) for watch in self._watches.values())
-
     def clear(self, within: Callable[[FloatArray], NDArray[np.bool_]] | None = None) -> None:
         """Forget the scans that wait; hide all objects, or those whose middles (n, 3) [m] are ``within`` an area.
 
@@ -151,7 +152,7 @@ class MovingObstacles:
         self._waiting.clear()
         with self._lock:
             self._tracker.clear(within)
-        for watch in self._watches.values():
+        for watch in self.watches.values():
             watch.cleared()
 
 
@@ -170,9 +171,9 @@ class TrackingLayer(MapLayer):
         """Keep a scan for the next update."""
         self._objects.insert_scan(scan)
 
-    def stale_reason(self, now: float) -> str:
-        """Name the source that is late at ``now`` [s]."""
-        return self._objects.stale_reason(now, self.parameters.expected_update_rate)
+    def watched_sources(self) -> Iterator[tuple[SourceWatch, float]]:
+        """All sensors, with one limit."""
+        return ((watch, self.parameters.expected_update_rate) for watch in self._objects.watches.values())
 
     def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
         """The objects it follows, without those that a clearing has hidden."""

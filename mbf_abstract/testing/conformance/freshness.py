@@ -5,7 +5,7 @@ from __future__ import annotations
 from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal, RecoveryGoal
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
-from mbf_abstract.testing.conformance.planning import FACE, WALL
+from mbf_abstract.testing.conformance.planning import FACE, WALL, expect_clear_of_face
 from mbf_abstract.testing.conformance.rig import MAX_SILENCE, SENSOR
 from mbf_abstract.testing.conformance.site import Site, situation, somewhere
 
@@ -64,6 +64,29 @@ def a_cleared_map_is_not_driven_on_until_it_sees_again(site: Site) -> None:
         site.expect_stands(0.6, "the map was cleared and nothing was seen since")
         site.rig.sensing = True
         site.expect_outcome(handle.wait(30.0), ExePathOutcome.SUCCESS)
+
+
+@situation()
+def a_plan_after_a_clearing_knows_what_is_seen(site: Site) -> None:
+    """After clearing all or the surroundings, by query or by recovery, a plan leads around what the sensor sees."""
+    site.place(WALL)
+    queries = site.server.queries
+    for clear in (queries.clear_map, lambda: queries.clear_area(5.0), lambda: site.navigator.recover("clear")):
+        clear()
+        plan = site.navigator.get_path(somewhere(7.0, 4.0))
+        site.expect_outcome(plan, GetPathOutcome.SUCCESS)
+        expect_clear_of_face(site, plan.path)
+
+
+@situation()
+def a_plan_after_a_clearing_waits_for_no_silent_sensor(site: Site) -> None:
+    """A sensor that is silent after a clearing delays a plan by no more than it may be silent."""
+    site.rig.sensing = False
+    site.server.queries.clear_map()
+    began = site.rig.clock.now()
+    site.expect_outcome(site.navigator.get_path(somewhere(7.0, 4.0)), GetPathOutcome.SUCCESS)
+    took = site.rig.clock.now() - began
+    site.expect(took < SILENT, f"the plan took {took:.2f} s")
 
 
 @situation(controller_patience=20.0)

@@ -23,6 +23,13 @@ CAGE = (Box(0.6, 2.6, 3.4, 2.8), Box(0.6, 5.2, 3.4, 5.4), Box(0.6, 2.6, 0.8, 5.4
 """Four walls around the robot's start, 1.2 m away."""
 
 
+def expect_clear_of_face(site: Site, path: Path | None) -> None:
+    """Expect that a path, if there is one, keeps away from the wall's face."""
+    if path is not None:
+        gap = min(math.hypot(x - 4.0, max(abs(y - 4.0) - 0.5, 0.0)) for x, y, _ in path.positions.tolist())
+        site.expect(gap > ROBOT_RADIUS - 0.1, f"the path passes the wall's face at {gap:.2f} m")
+
+
 def _end(path: Path | None, x: float, y: float) -> float:
     """Distance [m] of a path's end from a place; inf without a path."""
     return math.inf if path is None or not len(path) else path[-1].distance_to(somewhere(x, y))
@@ -49,9 +56,7 @@ def a_path_leads_around_what_was_seen(site: Site) -> None:
     site.place(WALL)
     plan = site.navigator.get_path(somewhere(7.0, 4.0))
     site.expect_outcome(plan, GetPathOutcome.SUCCESS)
-    if plan.path is not None:
-        gap = min(math.hypot(x - 4.0, max(abs(y - 4.0) - 0.5, 0.0)) for x, y, _ in plan.path.positions.tolist())
-        site.expect(gap > ROBOT_RADIUS - 0.1, f"the path passes the wall's face at {gap:.2f} m")
+    expect_clear_of_face(site, plan.path)
 
 
 @situation()
