@@ -111,7 +111,7 @@ def add_actors(
 
 
 def _ground(world: ScenarioWorld, x: float, y: float, key: str) -> float:
-    height = world.height_at(x, y)
+    height = world.ground_at(x, y)
     if not math.isfinite(height):
         raise off_the_ground(key, x, y)
     return height

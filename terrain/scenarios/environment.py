@@ -36,7 +36,7 @@ def build_environment(scenario: Scenario, folder: Path, seed: int) -> tuple[Scen
     try:
         rng = np.random.default_rng([seed, FOREST_STREAM])
         posts = _posts(scenario, rng, keep_clear, world)
-        obstacles = add_obstacles(world.physics, [*scenario.obstacles, *posts], world.height_at)
+        obstacles = add_obstacles(world.physics, [*scenario.obstacles, *posts], world.ground_at)
         add_actors(world, scenario.actors, np.random.default_rng([seed, ACTOR_STREAM]))
     except BaseException:
         world.physics.close()
@@ -50,9 +50,9 @@ def _posts(
     """Posts of all forests; raises ConfigError for one that is off the ground."""
     posts: list[Obstacle] = []
     for number, forest in enumerate(scenario.forests):
-        drawn = forest.posts(rng, keep_clear, world.height_at)
+        drawn = forest.posts(rng, keep_clear, world.ground_at)
         x, y = 0.5 * sum(forest.x_range), 0.5 * sum(forest.y_range)
-        if forest.count and not drawn and not math.isfinite(world.height_at(x, y)):
+        if forest.count and not drawn and not math.isfinite(world.ground_at(x, y)):
             raise off_the_ground(f"forests[{number}]", x, y)
         posts += drawn
     return posts

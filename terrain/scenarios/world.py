@@ -78,6 +78,13 @@ class ScenarioWorld:
         """Whether a pose lies inside a wall of a building; False in other worlds."""
         return self.walls is not None and self.grid is not None and self.grid.is_occupied(pose.x, pose.y)
 
+    def ground_at(self, x: float, y: float) -> float:
+        """Height of the highest ground [m] at (x, y), not finite where there is none: in a building, off its map."""
+        return math.nan if self._is_off_the_map(x, y) else self.height_at(x, y)
+
+    def _is_off_the_map(self, x: float, y: float) -> bool:
+        return self.grid is not None and not self.grid.covers(x, y)
+
     def pose_of(self, place: Place) -> Pose:
         """Return the pose on the ground that a place means, upright.
 
@@ -91,8 +98,8 @@ class ScenarioWorld:
                 known = ", ".join(self.places) or "none"
                 raise ConfigError([Finding("scenario", 1, "start or goals", f"a place of the world ({known})", place)])
             return self.places[place]
-        z = self.height_at(place.x, place.y) if place.z is None else place.z
-        if not math.isfinite(z) or (self.grid is not None and not self.grid.covers(place.x, place.y)):
+        z = self.ground_at(place.x, place.y) if place.z is None else place.z
+        if not math.isfinite(z) or self._is_off_the_map(place.x, place.y):
             raise off_the_ground("start or goals", place.x, place.y)
         return Pose.planar(place.x, place.y, place.yaw, z)
 

@@ -259,6 +259,18 @@ def test_a_ground_of_too_many_samples_or_none_is_refused_before_it_is_drawn(grou
         ),
         ({"obstacles": "[{x: 1.0, y: 1.0}, {x: 70.0, y: 1.0}]"}, "9: obstacles[1]: expected a place on the ground"),
         (
+            {"world": "{type: office}", "obstacles": "[{x: 900.0, y: 2.5}]"},
+            "9: obstacles[0]: expected a place on the ground of the world, got (900, 2.5)",
+        ),
+        (
+            {"world": "{type: office}", "forests": "[{x_range: [90.0, 95.0], y_range: [1.0, 2.0]}]"},
+            "9: forests[0]: expected a place on the ground of the world, got (92.5, 1.5)",
+        ),
+        (
+            {"world": "{type: office}", "actors": "[{type: walker, route: [[1.0, 1.0], [1.0, 90.0]]}]"},
+            "9: actors[0].route[1]: expected a place on the ground of the world, got (1, 90)",
+        ),
+        (
             {"obstacles": "[{x: 2.2, y: 2.6}]"},
             "7: start: expected a place outside the obstacles, got (2, 2.5), inside of",
         ),
