@@ -27,6 +27,7 @@ from mbf_abstract.config.yaml_source import read_yaml
 from mbf_abstract.parameters import ParameterModel, PluginParameters
 from mbf_abstract.plugins import Plugin, PluginKind
 
+_OF_SCENARIOS = {"world", "navigation"}
 _OWN_KEYS = ("backend", "allow_module_types", *PLUGIN_LISTS)
 
 
@@ -42,6 +43,9 @@ def load_config(path: str | os.PathLike[str]) -> RawConfig:
     document = read_yaml(path, findings)
     if document is None:
         raise ConfigError(findings)
+    if document.data.keys() >= _OF_SCENARIOS and not document.data.keys() & PLUGIN_LISTS.keys():
+        hint = "mbf run drives it; its configurations are those that its key navigation names"
+        raise ConfigError([*findings, document.finding((), "a configuration", "a scenario", hint)])
     backend = document.data.get("backend")
     if not isinstance(backend, str) or not backend:
         got = "nothing" if backend is None else repr(backend)

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Literal
 
+from mbf_abstract.config.configuration import PLUGIN_LISTS
 from mbf_abstract.config.findings import ConfigError, Finding, KeyPath
 from mbf_abstract.config.validation import validate
 from mbf_abstract.config.yaml_source import YamlDocument, load_yaml
@@ -97,6 +98,10 @@ def scenario_file(name_or_file: str | os.PathLike[str]) -> Path:
 
 def read_scenario(document: YamlDocument, findings: list[Finding]) -> Scenario | None:
     """Make a scenario of a document; what is wrong is appended to ``findings``, None if it is no scenario at all."""
+    if document.data.keys() & PLUGIN_LISTS.keys() and not document.data.keys() & {"world", "navigation"}:
+        hint = "a scenario has a world, a robot and goals, and names its configurations under navigation"
+        findings.append(document.finding((), "a scenario", "a configuration", hint))
+        return None
     scenario = validate(Scenario, document.data, document, (), findings)
     if scenario is None:
         return None

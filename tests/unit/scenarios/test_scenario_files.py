@@ -5,7 +5,9 @@ import pytest
 from PIL import Image
 
 from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.reading import load_config
 from terrain.scenarios.environment import build_environment
+from terrain.scenarios.library import LIBRARY
 from terrain.scenarios.noise import MapNoise
 from terrain.scenarios.scenario import load_scenario
 from terrain.scenarios.world import build_world
@@ -178,3 +180,22 @@ def test_several_levels_without_physics_are_refused(tmp_path):
     text = PLAIN.replace("{type: generated, size: [12.0, 10.0], spacing: 0.5}", "{type: bridge}")
     with pytest.raises(ConfigError, match="several levels"):
         load_scenario(scenario_file(tmp_path, text + "physics: kinematic\n"))
+
+
+def test_a_configuration_in_place_of_a_scenario_and_the_other_way_round_is_one_mistake(tmp_path):
+    file = tmp_path / "robot.yaml"
+    file.write_text("backend: costmap\nplanners: [{name: astar, type: astar}]\nglobal_costmap: {}\n")
+
+    with pytest.raises(ConfigError) as no_scenario:
+        load_scenario(file)
+    with pytest.raises(ConfigError) as no_configuration:
+        load_config(LIBRARY / "indoor.yaml")
+
+    assert [one.text for one in no_scenario.value.findings] == [
+        f"{file}:1: expected a scenario, got a configuration (a scenario has a world, a robot and goals, "
+        "and names its configurations under navigation)"
+    ]
+    assert [one.text for one in no_configuration.value.findings] == [
+        f"{LIBRARY / 'indoor.yaml'}:1: expected a configuration, got a scenario (mbf run drives it; "
+        "its configurations are those that its key navigation names)"
+    ]
