@@ -14,6 +14,8 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
+import signal
+import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -22,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from policy import COMMANDS, OBSERVED, WEIGHTS, action, start
 
+from mbf_abstract.whole_files import write_whole
 from terrain.learning.environment import of_bench_indoor
 
 Numbers = NDArray[np.float64]
@@ -65,18 +68,21 @@ def generation(
 
 
 def read_state() -> tuple[int, Numbers, Numbers]:
-    """Return how many generations are done, mean and spread."""
+    """Return how many generations are done, mean and spread; ValueError where the file is none of ours."""
     if not STATE.is_file():
         return 0, start(), np.full(len(start()), SPREAD)
-    state = json.loads(STATE.read_text())
-    return state["generation"], np.array(state["mean"]), np.array(state["spread"])
+    try:
+        state = json.loads(STATE.read_text())
+        return state["generation"], np.array(state["mean"]), np.array(state["spread"])
+    except (ValueError, TypeError, KeyError) as error:
+        raise ValueError(f"{STATE}: expected the state of a training ({error}); without it one begins anew") from None
 
 
 def write_state(done: int, mean: Numbers, spread: Numbers) -> None:
     """Keep what the next generation needs, and the weights for the controller."""
     state = {"generation": done, "mean": mean.tolist(), "spread": spread.tolist()}
-    STATE.write_text(json.dumps(state))
-    WEIGHTS.write_text(json.dumps(mean.tolist(), indent=2) + "\n")
+    write_whole(STATE, json.dumps(state))
+    write_whole(WEIGHTS, json.dumps(mean.tolist(), indent=2) + "\n")
 
 
 def positive(text: str) -> int:
@@ -92,9 +98,19 @@ def main() -> None:
     parser.add_argument("--workers", type=positive, default=2)
     parser.add_argument("--generations", type=positive, default=GENERATIONS)
     asked = parser.parse_args()
+    try:
+        train(asked.workers, asked.generations)
+    except ValueError as error:
+        parser.exit(2, f"{error}\n")
+    except KeyboardInterrupt:
+        sys.exit("stopped; the next call goes on after the last generation")
+
+
+def train(workers: int, generations: int) -> None:
+    """Train up to a generation; Ctrl-C is left to this process."""
     done, mean, spread = read_state()
-    with multiprocessing.Pool(asked.workers) as pool:
-        for number in range(done, asked.generations):
+    with multiprocessing.Pool(workers, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+        for number in range(done, generations):
             began = time.monotonic()
             mean, spread, returns = generation(number, mean, spread, lambda jobs: pool.map(drive, jobs, chunksize=2))
             write_state(number + 1, mean, spread)

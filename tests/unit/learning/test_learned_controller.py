@@ -78,6 +78,30 @@ def test_the_shipped_weights_drive_through_a_room_that_they_were_not_trained_in(
         environment.close()
 
 
+@pytest.mark.parametrize("text", ["", "{}", "[1, 2]"])
+def test_a_state_of_a_training_that_is_none_is_named(example, text, tmp_path, monkeypatch, capsys):
+    _, train = example
+    monkeypatch.setattr(train, "STATE", tmp_path / "training.json")
+    monkeypatch.setattr(sys, "argv", ["train.py"])
+    (tmp_path / "training.json").write_text(text)
+    with pytest.raises(SystemExit) as ended:
+        train.main()
+    assert ended.value.code == 2
+    assert "training.json: expected the state of a training" in capsys.readouterr().err
+
+
+def test_a_training_that_is_stopped_by_ctrl_c_says_how_it_goes_on(example, monkeypatch):
+    _, train = example
+    monkeypatch.setattr(sys, "argv", ["train.py"])
+
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(train, "train", stopped)
+    with pytest.raises(SystemExit, match="the next call goes on after the last generation"):
+        train.main()
+
+
 @pytest.mark.parametrize("words", [("--workers", "0"), ("--workers", "two"), ("--generations", "-1")])
 def test_a_training_without_workers_or_generations_is_refused(example, words, monkeypatch, capsys):
     _, train = example
