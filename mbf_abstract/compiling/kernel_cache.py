@@ -30,7 +30,7 @@ from numba.core.registry import CPUDispatcher
 from mbf_abstract.compiling.compilation import CompilerClock
 from mbf_abstract.compiling.garbage import PatientCollector
 from mbf_abstract.compiling.shared_cache import share_cache
-from mbf_abstract.compiling.sources import source_files
+from mbf_abstract.compiling.sources import read_source_files
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True}
 """Kernels run without the interpreter lock; none is called from C, so the wrapper for that is not compiled."""
@@ -118,9 +118,8 @@ def _sources(*folders: Path) -> str:
     """Digest of all Python files of folders and those below them: the kernels, and how they are compiled."""
     digest = hashlib.sha256()
     for folder in folders:
-        for file in source_files(folder):
-            if file.suffix == ".py":
-                digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
+        for file, content in read_source_files(folder, ".py"):
+            digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + content + b"\0")
     return digest.hexdigest()[:16]
 
 

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from mbf_abstract.compiling.sources import source_files
+from mbf_abstract.compiling.sources import read_source_files
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.parameters import ParameterModel, parameter
@@ -74,8 +74,7 @@ def place_of(package: str) -> Path | None:
 def hash_of_code(place: Path) -> str:
     """SHA-256 of a module's file, or of all files of a package but caches and hidden ones, with their names."""
     digest = hashlib.sha256()
-    for file in [place] if place.is_file() else source_files(place):
-        content = file.read_bytes()
+    for file, content in [(place, place.read_bytes())] if place.is_file() else read_source_files(place):
         digest.update(f"{file.relative_to(place.parent).as_posix()}\n{len(content)}\n".encode() + content)
     return digest.hexdigest()
 

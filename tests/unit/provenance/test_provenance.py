@@ -134,6 +134,23 @@ def test_the_hash_of_code_is_that_of_its_files_and_not_of_caches(tmp_path):
     assert len({hash_of_code(place) for place in (one, two, one / "__init__.py")}) == 3
 
 
+def test_a_file_that_goes_while_code_is_hashed_is_no_part_of_it(tmp_path, monkeypatch):
+    """An editor's copy that is there when the package is listed, and gone when it is read."""
+    place = package(tmp_path)
+    before = hash_of_code(place)
+    copy = place / "4913"
+    copy.write_text("an editor tries whether it can write here")
+    really_read = Path.read_bytes
+
+    def gone(file):
+        if file == copy:
+            copy.unlink()
+        return really_read(file)
+
+    monkeypatch.setattr(Path, "read_bytes", gone)
+    assert hash_of_code(place) == before
+
+
 def git(folder, *arguments):
     identity = ("-c", "user.name=a", "-c", "user.email=a@b")
     done = subprocess.run(["git", "-C", folder, *identity, *arguments], check=True, capture_output=True, text=True)
