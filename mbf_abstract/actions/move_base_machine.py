@@ -180,6 +180,9 @@ class MoveBaseMachine:
     def _follow_path(self, path: Path) -> None:
         if self._keeps_manoeuvre(path):
             return
+        if problem := self._setback(path):
+            self._stop_then_recover(Trigger.CONTROL, (ExePathOutcome.BLOCKED_PATH, problem))
+            return
         if self._goals.follow is None:
             self._oscillation.reset()
             self._replan_watch.restart()
@@ -187,6 +190,13 @@ class MoveBaseMachine:
         self._followed, self._followed_floor = path, self._planned_floor
         self._enter(MoveBaseState.EXE_PATH)
         self._goals.send_path(path, self._arrival_tolerance(path))
+
+    def _setback(self, path: Path) -> str:
+        """Why a newer plan for the same goal sets the robot back once too often; empty if it does not."""
+        feedback = self._goals.follow.feedback if self._goals.follow is not None else None
+        if feedback is None or self._state is not MoveBaseState.EXE_PATH:
+            return ""
+        return self._recoveries.note_new_path(path.length, feedback.distance_along_path)
 
     def _keeps_manoeuvre(self, path: Path) -> bool:
         """Whether the robot goes on with its manoeuvre instead of that of a newer plan for the same goal and floor."""

@@ -71,6 +71,10 @@ class RecoverySequence:
         if self._trigger is Trigger.PLAN:
             self._start_list_again()
 
+    def note_new_path(self, length: float, rest: float) -> str:
+        """A path replaces the one that is driven; why that is one setback too many, see the monitor."""
+        return self._monitor.note_new_path(length, rest)
+
     def note_motion(self, pose: Pose) -> None:
         """The robot follows a path: progress, once it is far enough from where it recovered."""
         if self._trigger in (Trigger.CONTROL, Trigger.OSCILLATION) and self._recovered_at is not None:

@@ -9,9 +9,11 @@ Where a robot is blocked and meets robots that announce their paths (``mbf_abstr
 ``meetings`` is due at the first failure: what clears maps or backs up takes time, and the others do not know of it. It
 runs ``MOST_MEETINGS`` times at a place at most.
 
+Between two ways that each look free from before the other one a robot drives to and fro, and nothing fails. So who
+replaces a path that is driven notes that, too, and a setback that comes so often at one place is a failure.
+
 When to use: one monitor for each goal of an executive of your own; ``move_base`` and the missions of behaviour trees
-have one. When not: a robot that moves without getting anywhere raises no failure; the oscillation and progress watches
-of ``exe_path`` make one of it.
+have one. When not: for a robot that gets nowhere along one path; ``exe_path`` watches its oscillation and progress.
 
 A place at which the ground is steeper than planned, or the wheels find no hold, is closed on the maps as soon as a
 recovery has led the robot away from it, so that the next plan leads around (``maps.avoided_places``). So is a place at
@@ -44,6 +46,8 @@ from mbf_abstract.outcomes import (
 from mbf_abstract.server.plugin_table import PluginTable
 from mbf_abstract.time.clock import TIME_RESOLUTION
 
+SETBACK = 1.0
+"""A new path is a setback if it is longer by more than this [m] than what was left of the one before."""
 MOST_MEETINGS = 5
 """How often the right of way is asked for at one place."""
 NO_PLAN = frozenset([GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_GOAL])
@@ -112,6 +116,7 @@ class StuckMonitor:
         """
         self._escalation = tuple(escalation)
         self._spots: list[TroubleSpot] = []
+        self._setbacks: list[Pose] = []
         self._present: TroubleSpot | None = None
         self._for_meeting = ""  # the behaviour that is due because the robot meets others
         self._avoided.forget()
@@ -147,6 +152,16 @@ class StuckMonitor:
                 tried=list(spot.tried),
                 message=str(spot),
             )
+
+    def note_new_path(self, length: float, rest: float) -> str:
+        """Note that a path would replace the ``rest`` [m] of the one that is driven; why that is a setback too many."""
+        limits, count = self._runtime.parameters, 0
+        with suppress(RobotStateError):
+            if length > rest + SETBACK:
+                self._setbacks.append(here := self._runtime.robot.pose())
+                count = sum(place.distance_to(here) <= limits.stuck_distance for place in self._setbacks)
+        too_many = 0 < limits.stuck_failures <= count
+        return f"{count} times at this place a path was to be given up for one that is longer" if too_many else ""
 
     def _avoid_or_open(self, pose: Pose, outcome: int, is_stuck: bool) -> None:
         """Note a place that is worse than the map says; open all again where no plan is left."""

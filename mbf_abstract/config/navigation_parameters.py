@@ -124,7 +124,11 @@ class NavigationParameters(ParameterModel):
 
     # Robots that are stuck
     stuck_failures: int = parameter(
-        3, "Failures of one kind at one place, for one goal, that count as stuck; 0 = never.", ge=0, le=1000
+        3,
+        "Failures of one kind at one place, for one goal, that count as stuck, and setbacks there that are a failure; "
+        "0 = never.",
+        ge=0,
+        le=1000,
     )
     stuck_time: float = parameter(
         10.0, "And that come at least this long after the first of them.", unit="s", ge=0.0, le=3600.0

@@ -18,6 +18,7 @@ from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.goals.result_types import ActionResult, GetPathResult
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.maps.tracking.objects import Motion
+from mbf_abstract.outcomes import ExePathOutcome
 
 SAME_PLACE = 1.0
 """A detour that was asked for less than this far away [m] was asked for here."""
@@ -61,13 +62,18 @@ class UpdatePath(GetPath):
         return replace(goal, max_retries=0) if self.once else goal
 
     def take_result(self, result: ActionResult) -> None:
-        """Keep the path of a success only."""
-        if result.success and isinstance(result, GetPathResult) and result.path is not None:
-            present = math.inf if self.mission.path is None else self.mission.path_to_follow().length
-            if not self.is_too_long(result.path.length, present):
-                super().take_result(result)
-            else:
-                self.feedback_message = f"{result.path.length:.1f} m instead of {present:.1f} m: not taken"
+        """Keep the path of a success only; one that sets the robot back once too often is a failure of its drive."""
+        if not result.success or not isinstance(result, GetPathResult) or result.path is None:
+            return
+        length = result.path.length
+        present = math.inf if self.mission.path is None else self.mission.path_to_follow().length
+        if self.is_too_long(length, present):
+            self.feedback_message = f"{length:.1f} m instead of {present:.1f} m: not taken"
+        elif problem := self.mission.stuck.note_new_path(length, present):
+            self.feedback_message = problem
+            self.mission.fail(ActionResult(int(ExePathOutcome.BLOCKED_PATH), problem))
+        else:
+            super().take_result(result)
 
     def is_too_long(self, length: float, present: float) -> bool:
         """Whether a path of this length [m] is not taken instead of the rest of the present one [m]."""

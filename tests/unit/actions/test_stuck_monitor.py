@@ -31,6 +31,12 @@ class Stand:
         self.monitor.note_failure(outcome)
         return self.monitor.stuck
 
+    def replace_path(self, x, length):
+        """Whether a path of this length is a setback too many, where 5 m were left."""
+        self.session.robot._x = x
+        self.session.clock.sleep(0.05)
+        return bool(self.monitor.note_new_path(length, 5.0))
+
 
 @pytest.fixture
 def stand():
@@ -264,3 +270,25 @@ def test_a_goal_that_is_over_leaves_no_place_closed(avoiding):
     made.fail(6.0, STUCK)
     recovered_at(made, 5.0)
     assert closed[-1] == [6.25]
+
+
+def test_the_third_longer_path_at_one_place_is_a_setback_too_many(stand):
+    there = stand(stuck_distance=0.5)
+    assert [there.replace_path(x, 7.0) for x in (0.0, 3.0, 0.1, 3.1, 0.2, 0.2, 3.2)] == [*[False] * 4, True, True, True]
+
+
+def test_a_path_that_is_hardly_longer_is_no_setback(stand):
+    there = stand()
+    assert not any(there.replace_path(0.0, 5.9) for _ in range(5))
+
+
+def test_setbacks_of_one_goal_do_not_count_for_the_next_one(stand):
+    there = stand()
+    assert [there.replace_path(0.0, 7.0) for _ in range(2)] == [False, False]
+    there.monitor.restart()
+    assert not there.replace_path(0.0, 7.0)
+
+
+def test_where_stuck_robots_are_not_looked_for_setbacks_are_none_either(stand):
+    there = stand(stuck_failures=0)
+    assert not any(there.replace_path(0.0, 7.0) for _ in range(5))

@@ -226,3 +226,20 @@ def test_without_a_way_between_both_it_is_planned_to_the_goal(make_session, on_t
     session.planner.play(straight_plan, NO_PATH, straight_plan)
     assert run(session).success
     assert [request.goal.x for request in session.planner.requests[:3]] == pytest.approx([6.0, 3.0, 6.0], abs=0.7)
+
+
+@pytest.mark.parametrize(("speed", "recovered"), [(0.02, ["clear"]), (0.5, [])], ids=["at one place", "on the way"])
+def test_a_robot_between_two_ways_recovers_instead_of_changing_its_mind_for_ever(
+    make_session, recoveries, speed, recovered
+):
+    def by_the_side(request):
+        return straight_plan(replace(request, via=(Pose.planar(1.0, 2.5),)))
+
+    session = make_session()
+    session.planner.play(*[straight_plan, by_the_side] * 3, straight_plan)
+    session.controller.play(*[drive(speed)] * 60, session.controller.follow)
+    options = TreeOptions(
+        check_poses=False, second_planner_pause=0.5, second_planner_look_ahead=0.0, longest_update=2.0
+    )
+    assert run(session, options).success
+    assert recoveries(session) == recovered

@@ -1,10 +1,14 @@
 """move_base: plans made anew while the robot drives, and what happens where they fail."""
 
+from dataclasses import replace
+
+import pytest
+
 from mbf_abstract.events import EventKind
-from mbf_abstract.geometry import Twist
+from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanResult
-from mbf_abstract.testing.faulty import obedient, slow
+from mbf_abstract.testing.faulty import drive, obedient, slow
 from mbf_abstract.testing.scripted import straight_plan
 
 
@@ -68,3 +72,17 @@ def test_the_time_to_the_next_plan_counts_from_when_the_robot_sets_off(make_sess
     assert session.plans == 2
     handle.cancel()
     handle.wait()
+
+
+def by_the_side(request):
+    """A way of some three metres more."""
+    return straight_plan(replace(request, via=(Pose.planar(1.0, 2.5),)))
+
+
+@pytest.mark.parametrize(("speed", "recovered"), [(0.02, ["first"]), (0.5, [])], ids=["at one place", "on the way"])
+def test_a_robot_between_two_ways_recovers_instead_of_changing_its_mind_for_ever(make_session, speed, recovered):
+    session = make_session(retries=0, planner_frequency=2.0)
+    session.planner.play(*[straight_plan, by_the_side] * 3, straight_plan)
+    session.controller.play(*[drive(speed)] * 60, session.controller.follow)
+    assert session.send(6.0).wait().success
+    assert session.recoveries == recovered
