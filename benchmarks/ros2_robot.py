@@ -6,11 +6,11 @@ sends the goals itself, so that all times are read from one clock. The last line
     python benchmarks/ros2_robot.py local|ros2|ws://... CONFIG PID GOALS SCANS SECONDS
 """
 
+import argparse
 import json
 import math
 import os
 import random
-import sys
 import threading
 from contextlib import ExitStack
 from pathlib import Path
@@ -379,17 +379,28 @@ def warm_up(link):
     link.wait(goal)
 
 
+def given():
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("link", help="local, ros2 or the address of a rosbridge server")
+    parser.add_argument("config", type=Path, help="of the navigator, where the link is local")
+    parser.add_argument("pid", type=int, help="process of the navigator; 0 for this one")
+    for what in ("goals", "scans"):
+        parser.add_argument(what, type=int, help="how many are measured")
+    parser.add_argument("seconds", type=float, help="of the drive")
+    return parser.parse_args()
+
+
 def main():
-    kind, config, pid, goals, scans, seconds = sys.argv[1:]
+    asked = given()
     with ExitStack() as closing:
-        if kind == "local":
-            link = LocalLink(Path(config), closing)
+        if asked.link == "local":
+            link = LocalLink(asked.config, closing)
         else:
-            link = RosLink(closing) if kind == "ros2" else BridgeLink(kind, closing)
+            link = RosLink(closing) if asked.link == "ros2" else BridgeLink(asked.link, closing)
         warm_up(link)
-        pid = int(pid) or os.getpid()
-        answer = measure_goals(link, int(goals)) | measure_scans(link, int(scans))
-        answer |= measure_drive(link, pid, float(seconds))
+        answer = measure_goals(link, asked.goals) | measure_scans(link, asked.scans)
+        answer |= measure_drive(link, asked.pid or os.getpid(), asked.seconds)
     print(json.dumps(answer), flush=True)
     os._exit(0)  # threads of the robot go on
 

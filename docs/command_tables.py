@@ -19,8 +19,9 @@ INTRODUCTION = """\
 <!-- Written by docs/generate_reference.py from the commands; do not edit. -->
 
 Every command of `mbf`, as `mbf COMMAND --help` describes it. Exit codes of all commands: 0 success, 1 the run was no
-success or no path was found, 2 bad arguments or a bad file. `mbf --install-completion` lets the shell complete names
-of commands, options, scenarios and plugins.
+success or no path was found, 2 bad arguments or a bad file, 130 Ctrl-C before the end (a command that runs until Ctrl-C
+ends with 0), 143 SIGTERM. `mbf --install-completion` lets the shell complete names of commands, options, scenarios and
+plugins.
 """
 
 

@@ -11,6 +11,7 @@ import sys
 
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.time.program_end import interruptible
 from terrain.session.session import Session, SessionOptions
 
 RECOVERY_FOR = {ExePathOutcome.COLLISION: "back_up", ExePathOutcome.ROBOT_STUCK: "back_up"}
@@ -38,7 +39,8 @@ if __name__ == "__main__":
     parser.add_argument("scenario", help="name of a shipped one, or a file")
     parser.add_argument("backend", help="map to drive on: mesh or costmap")
     given = parser.parse_args()
-    try:
-        sys.exit(0 if main(given.scenario, given.backend) else 1)
-    except ConfigError as error:
-        parser.exit(2, f"{error}\n")
+    with interruptible():  # Ctrl-C stops the robot first
+        try:
+            sys.exit(0 if main(given.scenario, given.backend) else 1)
+        except ConfigError as error:
+            parser.exit(2, f"{error}\n")

@@ -15,6 +15,7 @@ from mbf_abstract.executives.pacing import TimeLimit
 from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_drawing import as_text
 from mbf_abstract.executives.tree_executive import TreeExecutive
+from mbf_abstract.time.program_end import interruptible
 from terrain.session.session import Session, SessionOptions
 
 
@@ -32,7 +33,8 @@ if __name__ == "__main__":
     parser.add_argument("scenario", help="name of a shipped one, or a file")
     parser.add_argument("backend", help="map to drive on: mesh or costmap")
     given = parser.parse_args()
-    try:
-        sys.exit(0 if main(given.scenario, given.backend) else 1)
-    except ConfigError as error:
-        parser.exit(2, f"{error}\n")
+    with interruptible():  # Ctrl-C stops the robot first
+        try:
+            sys.exit(0 if main(given.scenario, given.backend) else 1)
+        except ConfigError as error:
+            parser.exit(2, f"{error}\n")

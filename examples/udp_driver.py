@@ -22,6 +22,7 @@ from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.program_end import interruptible
 
 FIRST_WORD, GREETING = 10.0, 0.5  # s to wait for the base, and between two greetings until it is heard
 
@@ -79,10 +80,10 @@ class UdpRobot:
 def main(config: str, base: tuple[str, int], x: float, y: float) -> bool:
     clock, transforms = WallClock(), TransformBuffer()
     robot = UdpRobot(base, clock, transforms)
-    if not robot.wait_until_heard(FIRST_WORD):
-        print(f"{base[0]}:{base[1]} is silent")
-        return False
     with Navigator.from_file(config, robot, clock, transforms) as navigator:  # the robot stops at the end of the block
+        if not robot.wait_until_heard(FIRST_WORD):
+            print(f"{base[0]}:{base[1]} is silent", file=sys.stderr)
+            return False
         navigator.server.warm_up(navigator.robot_pose(), navigator.ground_pose(x, y))
         result = navigator.go_to(navigator.ground_pose(x, y))
         print(f"{result.outcome_name}: {result.message}")
@@ -107,7 +108,8 @@ if __name__ == "__main__":
     for axis in ("x", "y"):
         parser.add_argument(axis, type=float, help="of the goal [m]")
     given = parser.parse_args()
-    try:
-        sys.exit(0 if main(given.config, given.base, given.x, given.y) else 1)
-    except (ConfigError, ValueError) as error:
-        parser.exit(2, f"{error}\n")
+    with interruptible():  # Ctrl-C stops the robot first
+        try:
+            sys.exit(0 if main(given.config, given.base, given.x, given.y) else 1)
+        except (ConfigError, ValueError) as error:
+            parser.exit(2, f"{error}\n")

@@ -23,6 +23,7 @@ from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.goals.result_types import GetPathResult
+from mbf_abstract.time.program_end import interruptible
 from terrain.session.session import Session, SessionOptions
 
 WAYPOINTS = [(7.5, 1.5), (1.5, 5.0), (6.0, 5.5), (3.5, 1.5)]  # x, y [m], all in the reception
@@ -125,7 +126,8 @@ if __name__ == "__main__":
     parser.add_argument("scenario", help="name of a shipped one, or a file")
     parser.add_argument("backend", help="map to drive on: mesh or costmap")
     given = parser.parse_args()
-    try:
-        sys.exit(0 if main(given.scenario, given.backend) else 1)
-    except ConfigError as error:
-        parser.exit(2, f"{error}\n")
+    with interruptible():  # Ctrl-C stops the robot first
+        try:
+            sys.exit(0 if main(given.scenario, given.backend) else 1)
+        except ConfigError as error:
+            parser.exit(2, f"{error}\n")

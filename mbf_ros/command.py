@@ -125,9 +125,10 @@ def _open(
 
 def _is_navigation(file: Path) -> bool:
     """Whether a file is a navigation file; what is wrong with one is found when it is read."""
+    from mbf_abstract.config.bounded_files import is_file
     from mbf_abstract.config.yaml_source import load_yaml
 
-    if not file.is_file():
+    if not is_file(file):
         return False
     return "navigation" not in load_yaml(file).data
 

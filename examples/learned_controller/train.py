@@ -15,7 +15,6 @@ import argparse
 import json
 import multiprocessing
 import signal
-import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -24,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from policy import COMMANDS, OBSERVED, WEIGHTS, action, start
 
+from mbf_abstract.time.program_end import INTERRUPTED
 from mbf_abstract.whole_files import write_whole
 from terrain.learning.environment import of_bench_indoor
 
@@ -103,7 +103,7 @@ def main() -> None:
     except ValueError as error:
         parser.exit(2, f"{error}\n")
     except KeyboardInterrupt:
-        sys.exit("stopped; the next call goes on after the last generation")
+        parser.exit(INTERRUPTED, "stopped; the next call goes on after the last generation\n")
 
 
 def train(workers: int, generations: int) -> None:

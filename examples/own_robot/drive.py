@@ -25,6 +25,7 @@ from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.program_end import interruptible
 
 FIRST_WORD = 10.0  # s to wait for each device
 CYCLE = 0.2  # s between two looks at lines, goals and the watchdog
@@ -134,7 +135,8 @@ if __name__ == "__main__":
     given = parser.parse_args()
     if given.to and len(given.to) not in (2, 3):
         parser.error(f"--to: expected X Y [YAW], got {len(given.to)} numbers")
-    try:
-        sys.exit(main(given))
-    except (ConfigError, OSError, ValueError) as error:  # what is wrong at the start
-        parser.exit(2, f"{error}\n")
+    with interruptible():  # Ctrl-C stops the robot first
+        try:
+            sys.exit(main(given))
+        except (ConfigError, OSError, ValueError) as error:  # what is wrong at the start
+            parser.exit(2, f"{error}\n")

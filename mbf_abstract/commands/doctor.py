@@ -19,6 +19,7 @@ import typer
 
 from mbf_abstract.commands.reporting import FAILURE
 from mbf_abstract.config.installed_plugins import DISTRIBUTION
+from mbf_abstract.native_output import quiet_native_output
 
 NEEDED = (*("numpy", "scipy", "numba", "trimesh", "networkx", "rtree", "yaml", "pydantic", "rich", "py_trees", "PIL"),)
 MESH_FILES = ("h5py", "lxml", "collada")
@@ -87,7 +88,8 @@ def examine() -> Iterator[Finding]:
 
 def _package(name: str, cure: str, optional: bool) -> Finding:
     try:
-        importlib.import_module(name)
+        with quiet_native_output():
+            importlib.import_module(name)
     except Exception as error:
         return Finding(name, f"{type(error).__name__}: {error}", cure, optional)
     distribution = DISTRIBUTIONS.get(name, name.replace("_", "-"))

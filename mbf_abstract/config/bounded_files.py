@@ -49,6 +49,14 @@ def is_there(path: Path) -> bool:
         return False
 
 
+def is_file(path: Path) -> bool:
+    """Whether there is a file with contents of this name; not so for what may not be looked at."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def special_file(path: Path) -> str:
     """What a path is if it is no file with contents: "a pipe", "a socket" or "a device"; "" otherwise.
 

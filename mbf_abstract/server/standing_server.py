@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mbf_abstract.config.bounded_files import is_there
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.config.installed_plugins import installed_points
@@ -87,7 +88,7 @@ def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavi
         There is no such file, no installed server reads its format, it is a configuration with mistakes, or a state of
         unknown cells is given for what has none.
     """
-    if not (file.is_file() or file.is_dir()):
+    if not is_there(file):
         raise ConfigError([Finding(str(file), 1, "", "a configuration, map or mesh file", "no such file")])
     if file.is_file() and file.suffix.lower() in YAML_SUFFIXES and not _is_map_description(file):
         if unknown:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
+from mbf_abstract.config.bounded_files import is_file
 from mbf_mesh_nav.files.elevation_files import elevation_readers, read_elevation
 from mbf_mesh_nav.files.file_frames import file_frame, on_the_map
 from mbf_mesh_nav.files.scene_reader import MeshArrays, read_scene
@@ -62,7 +63,7 @@ def read_mesh(
         reason = f"unknown ending '{ending}'; known: {', '.join(sorted(known))}"
         raise MeshError(str(path), [reason], "Of a point cloud, mbf map build makes a mesh")
     require_packages(path, ending)
-    if not path.is_file():
+    if not is_file(path):
         raise MeshError(str(path), ["there is no such file"])
     if path.stat().st_size > MAX_FILE_BYTES:
         raise MeshError(str(path), [f"{path.stat().st_size} bytes, the limit is {MAX_FILE_BYTES}"])

@@ -7,6 +7,7 @@ from pathlib import Path
 import typer
 
 from mbf_abstract.commands.check import Checked
+from mbf_abstract.config.bounded_files import is_there
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.config.yaml_source import YamlDocument, read_yaml
 
@@ -24,7 +25,7 @@ def check(file: Path, load: bool) -> Checked | None:
         All that is wrong with it, its configurations, its world and its plugins.
     """
     if file.suffix not in YAML_SUFFIXES:
-        if file.exists():
+        if is_there(file):
             return None
         from terrain.scenarios.scenario import scenario_file
 

@@ -181,7 +181,7 @@ def _driven(scenario: str, map_file: Path | None, options: RunOptions, over_ros:
 
             return run_scenario(on_other_map(loaded), replace(options, on_progress=on_progress))
     except (ConfigError, ServerError) as error:
-        raise _all_that_is_wrong(error, scenario, options, on_other_map) from error
+        raise _all_that_is_wrong(error, scenario, options, on_other_map) from error.__cause__  # it may be the same
 
 
 def _compiling_ahead(backend: str) -> AbstractContextManager[Callable[[], None]]:

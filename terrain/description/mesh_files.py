@@ -9,7 +9,7 @@ from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
-from mbf_abstract.config.bounded_files import special_file
+from mbf_abstract.config.bounded_files import is_file, special_file
 from mbf_abstract.geometry import FloatArray
 from terrain.description.solids import Hull
 
@@ -46,14 +46,7 @@ def read_hull(name: str, urdf: Path, scale: FloatArray) -> Hull | tuple[str, str
 
 def find_file(name: str, folder: Path) -> Path | None:
     """The file that a name in a URDF means, None if there is none; ``folder`` is where relative paths begin."""
-    return next((place for place in places_of(name, folder) if _is_file(place)), None)
-
-
-def _is_file(place: Path) -> bool:
-    try:
-        return place.is_file()
-    except (OSError, ValueError):  # a name that is too long, a folder that may not be read
-        return False
+    return next((place for place in places_of(name, folder) if is_file(place)), None)
 
 
 def missing_text(name: str, folder: Path) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import AckermannCommand, Command, Pose, Twist, Vector3, rotation_matrix
 from mbf_abstract.geometry.arithmetic import cross_product, rotated, rotated_back
-from terrain.physics.bullet import quiet_native_output
+from mbf_abstract.native_output import quiet_native_output
 from terrain.physics.drive import STEERING_SPEED, bicycle_angle, commanded_twist, twist_from_wheels, wheel_targets
 from terrain.physics.motion_sample import MotionSample, Thing
 from terrain.physics.robot_models import Drive, RobotSpec

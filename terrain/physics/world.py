@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
-from terrain.physics.bullet import connect, quiet_native_output
+from mbf_abstract.native_output import quiet_native_output
+from terrain.physics.bullet import connect
 from terrain.physics.protocols import SimulatedWorld
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid, wall_surface

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Literal
 
+from mbf_abstract.config.bounded_files import is_file
 from mbf_abstract.config.configuration import PLUGIN_LISTS
 from mbf_abstract.config.findings import ConfigError, Finding, KeyPath
 from mbf_abstract.config.validation import validate
@@ -88,7 +89,7 @@ def scenario_file(name_or_file: str | os.PathLike[str]) -> Path:
     path = Path(name_or_file)
     if path.suffix not in (".yaml", ".yml"):
         path = LIBRARY / f"{name_or_file}.yaml"
-        if not path.is_file():
+        if not is_file(path):
             known = ", ".join(sorted(shipped_scenarios()))
             raise ConfigError(
                 [Finding(str(name_or_file), 1, "", f"a file, or one of {known}", repr(str(name_or_file)))]
@@ -193,7 +194,7 @@ def _find_contradictions_of(scenario: Scenario, document: YamlDocument, at: Call
         expected = f"a backend listed under navigation ({known})"
         findings.append(document.finding(at("backend"), expected, scenario.backend))
     for backend, file in scenario.navigation.items():
-        if not file.is_file():
+        if not is_file(file):
             findings.append(document.finding(at("navigation", backend), "a configuration file", f"no file {file}"))
     own = [sensor.name for sensor in scenario.sensors]
     for index, name in enumerate(own):

@@ -18,8 +18,9 @@ from mbf_abstract.events import Event, EventSink
 from mbf_abstract.server.announcer import Announcer
 from mbf_abstract.time.clock import TIME_RESOLUTION, Clock
 from mbf_abstract.traffic.traffic import SharedChannel
-from terrain.scenarios.scenario import Scenario, load_scenario, robot_scenarios
+from terrain.scenarios.scenario import Scenario, robot_scenarios
 from terrain.scenarios.settings import apply_world_settings
+from terrain.session.navigation_config import errors_in_scenario
 from terrain.session.session import DEFAULT_OPTIONS, Member, Session, SessionOptions
 from terrain.session.simulation_session import SENSE_FIRST
 from terrain.session.site import Site
@@ -90,7 +91,11 @@ class FleetSession:
         options: SessionOptions = DEFAULT_OPTIONS,
         sinks: Mapping[str, tuple[EventSink, ...]] | None = None,
     ) -> None:
-        loaded = load_scenario(scenario) if isinstance(scenario, str) else scenario
+        with errors_in_scenario(scenario) as loaded:
+            self._build(loaded, options, sinks or {})
+
+    def _build(self, loaded: Scenario, options: SessionOptions, sinks: Mapping[str, tuple[EventSink, ...]]) -> None:
+        """The site, then the sessions of all robots in it."""
         self.scenario, settings = apply_world_settings(loaded, options.settings)
         self.seed = self.scenario.seed if options.seed is None else options.seed
         views = robot_scenarios(self.scenario)
@@ -100,9 +105,8 @@ class FleetSession:
             self._site = Site(self.scenario, options, self.seed, seeds)
             closing.callback(self._site.close)
             for name, view in views.items():
-                own = replace(
-                    options, seed=seeds[name], settings=settings, sinks=(*options.sinks, *(sinks or {}).get(name, ()))
-                )
+                own_sinks = (*options.sinks, *sinks.get(name, ()))
+                own = replace(options, seed=seeds[name], settings=settings, sinks=own_sinks)
                 session = Session(view, own, Member(self._site, name))
                 closing.callback(session.close)
                 self.sessions[name] = session

@@ -1,4 +1,7 @@
-"""The configuration of a run's server: the scenario's, with the files of its world and the numbers of its robot."""
+"""The configuration of a run's server: the scenario's, with the files of its world and the numbers of its robot.
+
+Errors about it, and about the scenario, name the files that somebody has written.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +15,10 @@ from pathlib import Path
 import yaml
 
 from mbf_abstract.config.findings import ConfigError, Finding
-from mbf_abstract.config.yaml_source import YamlDocument, read_yaml
+from mbf_abstract.config.yaml_source import YamlDocument, load_yaml, read_yaml
 from terrain.description.placeholders import fill_in
 from terrain.provenance.named_files import InputCopies, with_whole_folders
+from terrain.scenarios.scenario import Scenario, load_scenario, robot_scenarios, scenario_file
 from terrain.scenarios.settings import apply_settings
 from terrain.urdf_robots.robot_choice import RobotChoice, description_of
 
@@ -64,6 +68,22 @@ def errors_in_source(source: Path, folder: Path, settings: Mapping[str, str]) ->
     except ConfigError as error:
         document = read_yaml(source, []) or YamlDocument(source, {})
         raise ConfigError([_in_source(one, document, folder, settings) for one in error.findings]) from error
+
+
+@contextmanager
+def errors_in_scenario(given: Scenario | str) -> Iterator[Scenario]:
+    """Yield a scenario, the one of a name or a file loaded; a ConfigError about it then names its file and lines."""
+    if isinstance(given, Scenario):
+        yield given
+        return
+    loaded = load_scenario(given)
+    try:
+        yield loaded
+    except ConfigError as error:
+        document = load_yaml(scenario_file(given))
+        names = {"scenario", loaded.name, *(view.name for view in robot_scenarios(loaded).values())}
+        located = [document.located(one) if one.file in names else one for one in error.findings]
+        raise type(error)(located) from error
 
 
 def _in_source(finding: Finding, source: YamlDocument, folder: Path, settings: Mapping[str, str]) -> Finding:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mbf_abstract.config.bounded_files import is_file
 from mbf_abstract.config.findings import ConfigError, Finding, KeyPath, text_of
 from mbf_abstract.config.yaml_source import YamlDocument
 from mbf_abstract.server.factory import read_config
@@ -85,7 +86,7 @@ def check_scenario(
     if scenario is not None:
         views = robot_scenarios(scenario).values()
         files = list(dict.fromkeys((*pair, view.robot) for view in views for pair in view.navigation.items()))
-    chosen = [(name, file, robot) for name, file, robot in files if backend in (None, name) and file.is_file()]
+    chosen = [(name, file, robot) for name, file, robot in files if backend in (None, name) and is_file(file)]
     known = list(dict.fromkeys(name for name, _, _ in files))
     if backend is not None and files and backend not in known:
         findings.append(document.finding(("navigation",), f"one of {', '.join(known)}", repr(backend)))

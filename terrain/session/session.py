@@ -1,7 +1,6 @@
 """A scenario, ready to be driven by your own script: world, robot, server and navigator on one simulated clock.
 
-``mbf run`` is this plus an executive that visits the goals, and the results on disk; use ``Session`` to try an
-executive or plugins of your own in a world that ships.
+``mbf run`` is this plus an executive that visits the goals, and the results on disk.
 
 Example
 -------
@@ -33,13 +32,13 @@ from terrain.recording.recorded_robot import Report, RobotShape, as_mount
 from terrain.recording.recorder import LOCAL_MAP_PERIOD, Recorder
 from terrain.scenarios.environment import with_noise
 from terrain.scenarios.faults import ODOMETRY, FaultSchedule
-from terrain.scenarios.scenario import Scenario, load_scenario
+from terrain.scenarios.scenario import Scenario
 from terrain.scenarios.sensors import AnyRobot, make_localization, make_proprioceptive_sensors, make_sensors
 from terrain.scenarios.settings import apply_world_settings
 from terrain.sensors.proprioception import WheelOdometryReading
 from terrain.sensors.rays import FellowRays
 from terrain.sensors.sensor import Sensor
-from terrain.session.navigation_config import errors_in_source, write_navigation_config
+from terrain.session.navigation_config import errors_in_scenario, errors_in_source, write_navigation_config
 from terrain.session.simulation_session import SessionOptions, SimulationSession
 from terrain.session.site import Site
 
@@ -102,12 +101,18 @@ class Session(SimulationSession):
     def __init__(
         self, scenario: Scenario | str, options: SessionOptions = DEFAULT_OPTIONS, member: Member | None = None
     ) -> None:
-        loaded = load_scenario(scenario) if isinstance(scenario, str) else scenario
+        with errors_in_scenario(scenario) as loaded:
+            self._build(loaded, options, member)
+
+    def _build(self, loaded: Scenario, options: SessionOptions, member: Member | None) -> None:
         if loaded.robots:
             raise ConfigError([Finding(loaded.name, 1, "robots", "one robot; use a FleetSession", "several")])
         asked, settings = apply_world_settings(loaded, options.settings)
         self.scenario = with_noise(asked)
         self.backend = options.backend or self.scenario.backend
+        if self.backend not in self.scenario.navigation:
+            known = f"one of {', '.join(self.scenario.navigation)}"
+            raise ConfigError([Finding(loaded.name, 1, "navigation", known, repr(self.backend))])
         self.seed = self.scenario.seed if options.seed is None else options.seed
         self._is_alone = member is None
         self._member = member or Member(Site(self.scenario, options, self.seed, {"": self.seed}))
@@ -123,10 +128,7 @@ class Session(SimulationSession):
 
     def _wire(self, options: SessionOptions) -> None:
         """Sensors, then the server on their map, then the recorder."""
-        source = self.scenario.navigation.get(self.backend)
-        if source is None:
-            known = ", ".join(self.scenario.navigation)
-            raise ConfigError([Finding(self.scenario.name, 1, "navigation", f"one of {known}", repr(self.backend))])
+        source = self.scenario.navigation[self.backend]
         config_file = write_navigation_config(
             source, self.scenario.robot, self.world.files, self.folder, options.settings, self.inputs
         )
@@ -175,8 +177,7 @@ class Session(SimulationSession):
     def _make_recorder(self) -> Recorder:
         shape = RobotShape.of(self.robot.spec)
         recorder = Recorder(self.scenario.name, self.backend, shape, self.robot.pose(), self.goals)
-        recorder.ground, recorder.walls = self.world.ground, self.world.walls
-        recorder.obstacles = self.site.obstacles
+        recorder.ground, recorder.walls, recorder.obstacles = self.world.ground, self.world.walls, self.site.obstacles
         recorder.actors = [*self.world.actors, *self._member.fellows.values()]
         return recorder
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from mbf_abstract.config.bounded_files import read_arrays
+from mbf_abstract.config.bounded_files import is_file, read_arrays
 from mbf_abstract.geometry.survey import Survey
 from terrain.worlds.elevation_surveys import (
     PIXEL_SCALE,
@@ -133,7 +133,7 @@ def read_elevation(path: str | Path, max_samples: int = MAX_SAMPLES) -> Elevatio
     reader = readers.get(path.suffix.lower())
     if reader is None:
         raise TerrainFileError(path, f"unknown ending '{path.suffix}'; known: {', '.join(sorted(readers))}")
-    if not path.is_file():
+    if not is_file(path):
         raise TerrainFileError(path, "there is no such file")
     try:
         return reader(path, max_samples)

@@ -7,6 +7,7 @@ import math
 import os
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -165,8 +166,14 @@ def config(tmp_path):
 def drive(firmware, config, *where, **variables):
     lines = [word for name in ("base", "lidar", "beacons") for word in (f"--{name}", firmware.device(name))]
     command = [sys.executable, EXAMPLE / "drive.py", config, *lines, *where]
-    environment = {**os.environ, **variables}
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    return subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, **variables},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # which a shell lets its jobs ignore
+    )
 
 
 @pytest.mark.timeout(300)  # kernels are compiled on a machine that has none
@@ -202,6 +209,18 @@ def test_the_service_takes_goals_from_a_pipe_and_ends_with_the_robot_standing_wh
     assert "is lost" in errors and "SUCCESS" not in printed
     assert firmware.last_command() == (0.0, 0.0)
     assert math.dist((firmware.x, firmware.y), GOAL) > 0.5, "it stood before it was there"
+
+
+@pytest.mark.timeout(300)
+def test_ctrl_c_stops_the_robot_before_the_program_ends_with_one_line(firmware, config):
+    process = drive(firmware, config, "--to", *map(str, GOAL))
+    assert firmware.moves.wait(250), process.communicate()
+    process.send_signal(signal.SIGINT)
+    printed, errors = process.communicate(timeout=60)
+
+    assert (process.returncode, printed) == (130, "") and errors.endswith("interrupted\n"), errors
+    assert "Traceback" not in errors
+    assert firmware.last_command() == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(("name", "text"), [("plain.txt", "is no serial line"), (".", "Is a directory: ")])

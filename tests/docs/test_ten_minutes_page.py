@@ -6,6 +6,7 @@ import json
 import math
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -35,6 +36,7 @@ class Base(threading.Thread):
     def __init__(self):
         super().__init__(daemon=True)
         self.state = dict.fromkeys(("x", "y", "yaw", "v", "w"), 0.0)
+        self.last_command = {}
         self.over = threading.Event()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
@@ -46,7 +48,8 @@ class Base(threading.Thread):
         while not self.over.is_set():
             try:
                 data, driver = self._socket.recvfrom(2000)
-                self.state |= json.loads(data)
+                self.last_command = json.loads(data)
+                self.state |= self.last_command
                 last = time.monotonic()
             except TimeoutError:
                 pass
@@ -95,6 +98,28 @@ def test_the_driver_takes_a_base_to_its_goal_with_the_configuration_of_the_page(
     assert ended.stdout.startswith("SUCCESS")
     assert math.hypot(base.state["x"] - 1.0, base.state["y"] - 0.2) < 0.4
     assert base.state["v"] == base.state["w"] == 0.0
+
+
+@pytest.mark.timeout(300)
+def test_ctrl_c_stops_the_base_before_the_driver_ends_with_one_line(base, config):
+    driver = [sys.executable, str(ROOT / "examples" / "udp_driver.py"), config, f"127.0.0.1:{base.port}", "9.0", "0.2"]
+    process = subprocess.Popen(
+        driver,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # which a shell lets its jobs ignore
+    )
+    while base.state["v"] < 0.1:
+        assert process.poll() is None, process.communicate()
+        time.sleep(PERIOD)
+    process.send_signal(signal.SIGINT)
+    printed, errors = process.communicate(timeout=60)
+
+    assert (process.returncode, printed, errors) == (130, "", "interrupted\n")
+    base.over.set()
+    base.join(20.0)
+    assert base.last_command == {"v": 0.0, "w": 0.0}
 
 
 def test_the_driver_survives_rubbish_and_strangers_and_greets_a_base_that_boots_late():

@@ -339,6 +339,13 @@ def test_doctor_finds_this_installation_healthy():
     assert "python" in result.stdout and "kernel cache" in result.stdout
 
 
+def test_nothing_that_doctor_imports_prints_between_its_lines():
+    """PyBullet prints the time of its build when it is imported, past Python's own output."""
+    done = subprocess.run([sys.executable, "-m", "mbf_abstract", "doctor"], capture_output=True, text=True)
+    assert done.stdout.startswith("ok  python") and not done.stderr
+    assert all(line[:4] in ("ok  ", "--  ", "!!  ", "    ") for line in done.stdout.splitlines()), done.stdout
+
+
 def test_doctor_names_the_package_that_is_too_old_and_how_to_replace_it(monkeypatch):
     monkeypatch.setitem(doctor.oldest_versions(), "numpy", "99.1")
 

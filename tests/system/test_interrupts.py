@@ -10,6 +10,7 @@ import pytest
 
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.session import NavigationSession
+from mbf_abstract.time.program_end import end_of_the_program, interruptible
 from mbf_mesh_nav.kernels.mesh.incidence import faces_of_vertices
 
 AT_IMPORT = """
@@ -74,6 +75,29 @@ def test_an_interrupt_while_a_kernel_runs_is_no_error_of_the_kernel(default_hand
         while True:
             faces_of_vertices(faces, faces.size)
     thread.join()
+
+
+def test_a_script_ends_with_130_also_where_a_library_makes_another_error_of_ctrl_c(capsys):
+    with pytest.raises(SystemExit) as ended, interruptible():
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as error:
+            raise SystemError("returned a result with an exception set") from error
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "interrupted\n"
+
+
+def test_an_error_that_is_its_own_cause_is_none_of_ctrl_c_and_hangs_nobody():
+    error = ValueError("raised from itself")
+    error.__cause__ = error
+    assert end_of_the_program(error) is None
+
+
+@pytest.mark.parametrize("error", [ValueError("wrong"), SystemExit(143)])
+def test_what_is_no_interrupt_of_a_script_is_left_alone(error, capsys):
+    with pytest.raises(type(error)) as raised, interruptible():
+        raise error
+    assert raised.value is error and not capsys.readouterr().err
 
 
 def test_an_interrupt_of_a_closing_session_is_one_although_what_closes_next_raises():

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mbf_abstract.config.bounded_files import special_file
+from mbf_abstract.config.bounded_files import is_file, special_file
 from mbf_abstract.config.findings import text_of
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.building.clouds.coordinate_system import given_system
@@ -186,7 +186,7 @@ def _read(file: Path, max_points: int, up_axis: str, unit: float, clearance: flo
         raise MeshError(str(file), [f"unknown ending '{file.suffix}'; known: {known}"])
     if kind := special_file(file):
         raise MeshError(str(file), [f"expected a file, got {kind}"])
-    if not file.is_file():
+    if not is_file(file):
         raise MeshError(str(file), ["there is no such file"])
     try:
         is_mesh = ending in MESH_ENDINGS or (ending == ".ply" and has_faces(file))

@@ -5,6 +5,7 @@
   if (window.mbfVisitor) window.mbfVisitor.close();
   const SEND_EVERY = 100; // ms; the pointer. The stick is reported at each heartbeat
   const LEAST_DRAG = 8; // pixels; less is a click
+  const GOING_AWAY = 1001; // WebSocket close code of a server that ends
   const PAD = 55; // pixels; half the side of the stick's field
   const KEYS = { KeyW: [0, 1], ArrowUp: [0, 1], KeyS: [0, -1], ArrowDown: [0, -1],
                  KeyA: [1, 0], ArrowLeft: [1, 0], KeyD: [-1, 0], ArrowRight: [-1, 0] }; // turn, forward
@@ -28,6 +29,9 @@
   root.id = "mbf-visitor";
   const bar = element(root, "div", "position:absolute;top:10px;left:50%;transform:translateX(-50%);display:flex;" +
     "gap:2px;padding:3px;" + CARD);
+  const notice = element(root, "div", "position:absolute;top:60px;left:50%;transform:translateX(-50%);padding:8px 14px;" +
+    "font-size:14px;display:none;" + CARD);
+  notice.id = "mbf-notice";
   const readout = element(root, "div", "position:absolute;left:10px;bottom:10px;padding:4px 8px;display:none;" + CARD);
   readout.id = "mbf-values";
   const SVG = "http://www.w3.org/2000/svg";
@@ -242,15 +246,19 @@
     }), false);
     addStick();
   };
+  const watch = () => element(bar, "span", "padding:3px 9px;color:#57606a;", { textContent: "Watching only",
+    title: "The panel shows what those choose who steer; its buttons do nothing here" });
   const takeBeat = (time) => { beat = time; if (stick) reportStick(); };
   const shown = { beat: takeBeat, values: showValues, placing: showPlacing, tree: showTree, stick: showStatus,
-    role: (role) => { if (role === "steer" && !steers) steer(); } };
+    role: (role) => { if (role === "steer") { if (!steers) steer(); } else watch(); } };
   socket.onmessage = (event) => {
     for (const [kind, content] of Object.entries(JSON.parse(event.data))) shown[kind]?.(content);
   };
-  socket.onclose = () => {
+  socket.onclose = ({ code }) => {
     steers = false;
-    if (status) status.textContent = "Connection lost: reload the page";
+    notice.textContent = code === GOING_AWAY ? "The run has ended" : "Connection lost: reload the page";
+    notice.style.display = "block";
+    if (status) status.textContent = notice.textContent;
   };
   const timer = setInterval(() => { fit(); reportPointer(); }, SEND_EVERY);
   listen(window, "keydown", (event) => { if (event.code === "Escape" && drag) { swallow(event); endDrag(); } });

@@ -90,7 +90,7 @@ def test_a_state_of_a_training_that_is_none_is_named(example, text, tmp_path, mo
     assert "training.json: expected the state of a training" in capsys.readouterr().err
 
 
-def test_a_training_that_is_stopped_by_ctrl_c_says_how_it_goes_on(example, monkeypatch):
+def test_a_training_that_is_stopped_by_ctrl_c_says_how_it_goes_on(example, monkeypatch, capsys):
     _, train = example
     monkeypatch.setattr(sys, "argv", ["train.py"])
 
@@ -98,8 +98,10 @@ def test_a_training_that_is_stopped_by_ctrl_c_says_how_it_goes_on(example, monke
         raise KeyboardInterrupt
 
     monkeypatch.setattr(train, "train", stopped)
-    with pytest.raises(SystemExit, match="the next call goes on after the last generation"):
+    with pytest.raises(SystemExit) as ended:
         train.main()
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "stopped; the next call goes on after the last generation\n"
 
 
 @pytest.mark.parametrize("words", [("--workers", "0"), ("--workers", "two"), ("--generations", "-1")])

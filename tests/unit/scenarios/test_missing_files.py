@@ -84,3 +84,34 @@ def test_a_missing_image_has_the_line_of_its_map(tmp_path):
 
     expected = f"floor.yaml:3: image: expected an image, got 'gone.png' (no file {tmp_path / 'gone.png'})"
     assert result.exit_code == 2 and expected in result.output
+
+
+LONG = 5000 * "x"
+
+
+@pytest.mark.parametrize("name", ["gone.yaml", f"{LONG}.yaml"])
+def test_a_run_of_a_file_that_is_not_there_is_one_line(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(make_app(), ["run", name])
+    assert result.exit_code == 2 and f"{name}:1: expected a readable file, got " in result.output
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("nav_mesh.yaml", f"{LONG}.yaml", "trial.yaml:4: navigation.mesh: expected a configuration file, got "),
+        (
+            "type: office",
+            f"type: mesh\n  file: {LONG}.ply",
+            "trial.yaml:7: world.file: expected a mesh to drive on, got ",
+        ),
+        ("  turtlebot", f"  urdf: {LONG}.urdf", "trial.yaml:7: robot: expected a URDF, got "),
+        ("$WORLD_MESH", f"{LONG}.ply", "nav_mesh.yaml:5: mesh_map.mesh_file: expected a file, got "),
+    ],
+    ids=["configuration", "world", "robot", "map"],
+)
+def test_a_name_that_is_too_long_for_a_file_is_named_with_its_key(written, command, old, new, place):
+    written("mesh", old, new)
+    result = CliRunner().invoke(make_app(), [command, "trial.yaml", *COMMANDS[command]])
+    assert result.exit_code == 2 and place in result.output and "File name too long" not in result.output

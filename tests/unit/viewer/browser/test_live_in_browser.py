@@ -89,7 +89,9 @@ def test_the_page_shows_the_run_and_steers_it(chromium, served_run, tmp_path):
         await page.press("Cancel")
         await page.read("CANCELED: canceled in the live view")
         await page.press("End the run")
-        return page.errors, png
+        errors = list(page.errors)
+        await page.read("The run has ended")
+        return errors, png
 
     errors, png = chromium.visit(steer)
     answer = json.loads(process.stdout.read())
@@ -117,6 +119,7 @@ def test_a_page_for_watching_only_shows_the_run_without_a_button_that_could_be_p
 
     errors, text, disabled = chromium.visit(watch)
 
+    assert "Watching only" in text
     assert errors == [] and "lidar" in disabled
     steering = ("Cancel", "Pause", "End the run", "Inject", "a click is", "Waypoints", "WASD", "Place")
     assert not [word for word in steering if word in text]
