@@ -5,11 +5,13 @@ under patience and retries, and the ``fallback_planner`` where that finds no pat
 transformed - result. The robot never moves.
 
 A robot that finds no path, and hears of others that may leave, plans once more on the map without them. It announces
-that path as its wish (``mbf_abstract.traffic``), so that they can meet; the result has none.
+that path as its wish (``mbf_abstract.traffic``), so that they can meet; the result has none. Retries end with half of
+the patience then. The wish has what is left of it, at least the other half, so both take one and a half at most.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -38,6 +40,9 @@ from mbf_abstract.traffic.announcement import Announcement
 
 BESIDE_BODY = 0.1
 """The sensed body of another robot lies at most this far [m] outside of the one that it announces."""
+
+WISH_SHARE = 0.5
+"""Of the patience, for the plan of a wish, at least."""
 
 SCAN_CHECK = 0.05  # s; how often a plan that waits for a scan looks for it
 
@@ -78,10 +83,11 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         except (TransformError, RobotStateError) as error:
             return GetPathResult(GetPathOutcome.TF_ERROR, str(error), planner=plugin.name)
         job.report_started(plugin=plugin.name)
+        began = self.runtime.clock.now()
         result = self._best_plan(job, plugin, request, area)
         # 5. A robot that finds no path from where it is asks others to leave it one.
         if handle.goal.start_pose is None:
-            self._announce_wish(job, result, request, area)
+            self._announce_wish(job, result, request, area, self.runtime.clock.now() - began)
         return result
 
     def _best_plan(
@@ -89,12 +95,12 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
     ) -> GetPathResult:
         """3. Plan; where there is no path for this planner there may be one for the other."""
         fallback = self._fallback_of(plugin)
-        first = self._plan(job, plugin, request, area, has_fallback=bool(fallback))
+        first = self._plan(job, plugin, request, area, 0.0 if fallback else self._retry_time(job))
         if not fallback or first.is_final or first.outcome not in FALLBACK_OUTCOMES or job.handle.cancel_requested:
             return first
         if problem := self._plugins.problem(self.kind, fallback):
             return replace(first, message=f"{first.message}; fallback_planner: {problem}")
-        second = self._plan(job, self._plugins.get(self.kind, fallback), request, area)
+        second = self._plan(job, self._plugins.get(self.kind, fallback), request, area, self._retry_time(job))
         return replace(second, message=f"{fallback}: {second.message}; before, {plugin.name}: {first.message}")
 
     def _fallback_of(self, plugin: LoadedPlugin[AbstractPlanner]) -> str:
@@ -102,13 +108,18 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         name = self.runtime.parameters.fallback_planner
         return "" if name == plugin.name else name
 
+    def _retry_time(self, job: Job) -> float:
+        """Part of the patience [s] for retries: all of it, unless a wish may follow."""
+        shares = self.patience > 0.0 and job.handle.goal.start_pose is None and those_that_leave(self.runtime)
+        return (1.0 - WISH_SHARE) * self.patience if shares else math.inf
+
     def _plan(
         self,
         job: Job,
         plugin: LoadedPlugin[AbstractPlanner],
         request: PlanRequest,
         area: GoalArea | None,
-        has_fallback: bool = False,
+        retry_time: float,
     ) -> GetPathResult:
         """Plan with the map kept alive, under patience and retries, and judge how it ended."""
         handle, run = job.handle, self._supervise(job, plugin)
@@ -117,7 +128,7 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
                 # permanent: no recovery brings a map
                 return GetPathResult(GetPathOutcome.MAP_ERROR, missing, planner=plugin.name, permanent=True)
             self._await_scans(run)
-            execution = PlannerExecution(run, request, area, has_fallback, handle.goal.max_retries)
+            execution = PlannerExecution(run, request, area, retry_time, handle.goal.max_retries)
             end = execution.execute()
             # 4. Check the path of a plugin that reports success.
             judge = partial(path_result, end, execution.last_result, request, self.runtime, plugin.name, area)
@@ -133,13 +144,18 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
             self.runtime.clock.sleep(SCAN_CHECK)
             run.patience_watch.restart()  # patience is with the planner
 
-    def _announce_wish(self, job: Job, result: GetPathResult, request: PlanRequest, area: GoalArea | None) -> None:
-        """Announce the path that there would be without the robots that may leave; none, if this is of no use."""
+    def _announce_wish(
+        self, job: Job, result: GetPathResult, request: PlanRequest, area: GoalArea | None, planned_for: float
+    ) -> None:
+        """Announce the path that there would be without the robots that may leave; none, if this is of no use.
+
+        ``planned_for``: how long [s] the planner has taken with the robots.
+        """
         runtime = self.runtime
         if runtime.gate.holder:  # one that drives announces the path that it follows
             return
         others = those_that_leave(runtime) if result.plugin_outcome in FALLBACK_OUTCOMES and not result.is_final else ()
-        wish = self._plan_without(others, job, result.planner, request, area) if others else None
+        wish = self._plan_without(others, job, result.planner, request, area, planned_for) if others else None
         if wish is not None:
             text = f"there would be a path of {wish.length:.2f} m without {', '.join(one.name for one in others)}"
             runtime.events.emit(EventKind.CUSTOM, self.name, goal_id=job.handle.id, message=text)
@@ -152,6 +168,7 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         planner: str,
         request: PlanRequest,
         area: GoalArea | None,
+        planned_for: float,
     ) -> Path | None:
         """The path that a planner finds while the map does not know of some robots; None if there is none."""
         frame, hooks = self.runtime.parameters.global_frame, self.runtime.map_hooks
@@ -160,7 +177,11 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
             for one in others
             for x, y, z in [one.path[0].tolist()]
         ]
-        run = self._supervise(job, self._plugins.get(self.kind, planner))
+
+        def patience_left() -> float:
+            return max(self.patience - planned_for, WISH_SHARE * self.patience)
+
+        run = self._supervise(job, self._plugins.get(self.kind, planner), patience=patience_left)
         with run, run.map_in_use():
             run.call_beside("the map's forget()", partial(hooks.forget, places))
             execution = PlannerExecution(run, request, area, max_retries=0)

@@ -58,9 +58,16 @@ class PluginAction(Action[G, R, F], Generic[G, R, F, P]):
         return plugin
 
     def _supervise(
-        self, job: GoalJob[G, R, F], plugin: LoadedPlugin[P], stop_robot: Callable[[str], None] = no_motion
+        self,
+        job: GoalJob[G, R, F],
+        plugin: LoadedPlugin[P],
+        stop_robot: Callable[[str], None] = no_motion,
+        patience: Callable[[], float] | None = None,
     ) -> PluginRun[P]:
-        """Supervise the plugin for a goal; ``stop_robot`` is called with the reason before a goal ends that hangs."""
+        """Supervise the plugin for a goal; ``stop_robot`` is called with the reason before a goal ends that hangs.
+
+        ``patience`` answers that of this run [s], if it is not the action's.
+        """
 
         def end(run: PluginRun[P]) -> None:
             stop_robot(f"{run.suspect} hangs")
@@ -72,4 +79,4 @@ class PluginAction(Action[G, R, F], Generic[G, R, F, P]):
                 text = f"{run.suspect} {run.why_given_up}"
                 job.abandon(self.patience_outcome, text)
 
-        return PluginRun(self.runtime, plugin, job.handle, lambda: self.patience, end)
+        return PluginRun(self.runtime, plugin, job.handle, patience or (lambda: self.patience), end)

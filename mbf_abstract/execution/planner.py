@@ -16,11 +16,13 @@ Between two calls there is a pause of ``planner_retry_delay``, so that a planner
 busy.
 
 A goal whose planner has a *fallback* does not call it again after one of ``FALLBACK_OUTCOMES``: the retries are the
-fallback's then. After other failures, which the fallback is not called for, the retries are its own.
+fallback's then. After other failures, which the fallback is not called for, the retries are its own. Where others may
+leave (``actions.get_path``), none of these outcomes is followed by a call in the second half of the patience.
 """
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 from functools import partial
 
@@ -51,6 +53,12 @@ class PlannerState(Enum):
 class PlannerExecution:
     """One get_path goal's calls of its planner.
 
+    Parameters
+    ----------
+    retry_time : float
+        Part of the patience [s] after which the planner is not called again when it has found no path: something else
+        is tried then. 0 = it is called once.
+
     Attributes
     ----------
     state : PlannerState
@@ -63,12 +71,12 @@ class PlannerExecution:
         run: PluginRun[AbstractPlanner],
         request: PlanRequest,
         area: GoalArea | None = None,
-        has_fallback: bool = False,
+        retry_time: float = math.inf,
         max_retries: int | None = None,
     ) -> None:
         self._run = run
         self._max_retries = max_retries
-        self._has_fallback = has_fallback
+        self._retry_time = retry_time
         self._runtime = run.runtime
         self._request = request
         self._area = area
@@ -100,7 +108,7 @@ class PlannerExecution:
 
     def _judge(self, result: PlanResult, calls: int) -> PlanResult | None:
         """What this answer ends the execution with, in upstream's order; None = call again."""
-        falls_back = self._has_fallback and result.outcome in FALLBACK_OUTCOMES
+        falls_back = self._run.patience_watch.elapsed >= self._retry_time and result.outcome in FALLBACK_OUTCOMES
         usual = self._runtime.parameters.planner_max_retries
         max_retries = 0 if falls_back else usual if self._max_retries is None else self._max_retries
         if self._run.canceled and not self._run.patience_exceeded:

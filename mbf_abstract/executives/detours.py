@@ -69,7 +69,7 @@ class UpdatePath(GetPath):
         present = math.inf if self.mission.path is None else self.mission.path_to_follow().length
         if self.is_too_long(length, present):
             self.feedback_message = f"{length:.1f} m instead of {present:.1f} m: not taken"
-        elif problem := self.mission.stuck.note_new_path(length, present):
+        elif problem := self.mission.drives and self.mission.stuck.note_new_path(length, present):
             self.feedback_message = problem
             self.mission.fail(ActionResult(int(ExePathOutcome.BLOCKED_PATH), problem))
         else:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from mbf_abstract.actions.exe_path import ExePathAction
 from mbf_abstract.actions.stuck_monitor import StuckMonitor
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.execution.path_tracker import PathTracker
@@ -142,6 +143,11 @@ class MissionContext:
     def running_goals(self) -> list[AnyGoalHandle]:
         """Goals of this mission that are not final."""
         return [handle for handle in self._handles if not handle.done]
+
+    @property
+    def drives(self) -> bool:
+        """Whether a goal of this mission follows a path."""
+        return any(goal.action == ExePathAction.name for goal in self.running_goals())
 
     @property
     def robot_is_stopping(self) -> bool:

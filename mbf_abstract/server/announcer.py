@@ -9,13 +9,16 @@ Example
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 import numpy as np
 
 from mbf_abstract.actions.meetings import distance_of_meetings
 from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.events import EventKind
 from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.execution.plan_check import path_in_global_frame
+from mbf_abstract.execution.plan_check import in_global_frame, path_in_global_frame
+from mbf_abstract.execution.planner import FALLBACK_OUTCOMES
 from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import TransformError
@@ -24,19 +27,23 @@ from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.server.making_room import MakingRoom
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.traffic.announcement import DIGITS, Announcement
-from mbf_abstract.traffic.traffic import Channel
+from mbf_abstract.traffic.traffic import ANOTHER_GOAL, Channel
 
 LENGTH = 12.0
 """How much of its path [m] a robot announces."""
 IDLE_TIME = 2.0
 """A robot without a goal for this long [s] goes nowhere; executives send one goal after the other."""
 
+ASKS_FOR = 3.0
+"""A plan beside a drive that fails counts for so long [s]; some executives plan only while their path is blocked."""
+
 
 class Announcer:
     """Publishes for one server: the path that ``exe_path`` follows, and in recoveries the one that it has followed.
 
     A robot without a path announces what it wishes, see ``Traffic.wish``, until it follows another path, or its goal is
-    over. A robot without a goal also makes room for others that ask, see ``making_room``.
+    over. One that drives asks who stands on its path for room while plans beside the drive find no path to its end.
+    A robot without a goal also makes room for others that ask, see ``making_room``.
 
     Parameters
     ----------
@@ -52,8 +59,10 @@ class Announcer:
         self._wished: Path | None = None
         self._tracker: PathTracker | None = None
         self._busy = -math.inf
+        self._failed = -math.inf  # when the last plan beside the drive found no path
         server.runtime.traffic.connect(name, channel)
         self._making_room = MakingRoom(server)
+        server.get_path.listeners.append(self._note_plan)
         for action in (server.move_base, server.recovery):
             action.listeners.append(self._end_wish)
 
@@ -62,6 +71,7 @@ class Announcer:
         runtime = self._server.runtime
         now = runtime.clock.now()
         self._take_path(now)
+        self._ask_ahead(now)
         try:
             pose = runtime.robot.pose()
         except RobotStateError:
@@ -102,6 +112,27 @@ class Announcer:
             self._busy = now
         elif now - self._busy >= IDLE_TIME:
             traffic.wished = self._wished = self._tracker = None
+
+    def _ask_ahead(self, now: float) -> None:
+        """Ask who stands on the path that is driven for room while plans beside the drive find none."""
+        traffic, was_held_up = self._server.runtime.traffic, self._server.runtime.traffic.held_up
+        if not self._server.exe_path.busy:
+            self._failed = -math.inf
+        traffic.held_up = now - self._failed < ASKS_FOR
+        if traffic.held_up and not was_held_up:
+            text = "finds no path beside its drive, and asks who stands on its path for room"
+            self._server.runtime.events.emit(EventKind.CUSTOM, "announcer", message=text)
+
+    def _note_plan(self, handle: AnyGoalHandle) -> None:
+        """Note whether there is a path from where the robot drives to the end of the one that it follows."""
+        driven, goal, result = self._server.exe_path.unfinished, handle.goal, handle.result
+        if not driven or goal.start_pose is not None or handle.status is GoalStatus.CANCELED or result is None:
+            return
+        with suppress(TransformError):
+            ends = [in_global_frame(end, self._server.runtime) for end in (goal.target_pose, driven[-1].goal.path[-1])]
+            if ends[0].distance_to(ends[1]) <= ANOTHER_GOAL:
+                fails = result.plugin_outcome in FALLBACK_OUTCOMES and not result.is_final
+                self._failed = self._server.runtime.clock.now() if fails else -math.inf
 
     def _end_wish(self, handle: AnyGoalHandle) -> None:
         """End what a robot wishes with its goal: that of ``move_base``, or of an executive, which cancels what runs."""

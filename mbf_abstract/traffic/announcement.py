@@ -42,7 +42,7 @@ class Announcement:
     makes_room : bool
         Whether it has no goal and pulls out for a robot that asks; see ``server.making_room``.
     asks : bool
-        Whether it is blocked and waits for those that make room near its path.
+        Whether it wants those that make room to leave its path: it is blocked and waits, or drives up to them.
     distance : float
         From its own path to that of a robot like this one [m] at which they do not meet; 0 = not known.
     wishes : bool

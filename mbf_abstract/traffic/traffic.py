@@ -23,8 +23,6 @@ MAX_AGE = 3.0
 """A robot that announces nothing new for this long [s] does not count: it is switched off, or out of reach."""
 PARTED_AFTER = 10.0
 """A meeting is over when nobody has been in the way for this long [s]: longer than it takes to drive past."""
-
-
 ANOTHER_GOAL = 1.0
 """A path that ends farther than this [m] from where the last one ended leads to another goal."""
 
@@ -102,8 +100,8 @@ class Traffic:
         Where the robot is and wants to go.
     yields : bool
         Whether it is letting others pass: then it announces where it is, and not where it wants to go.
-    asks : bool
-        As it is announced; see ``ask``.
+    asks, held_up : bool
+        Whether it waits, see ``ask``, or drives and finds no other path: it announces of both that it asks.
     wished : Path or None
         What the robot would follow, see ``wish``.
     """
@@ -111,7 +109,7 @@ class Traffic:
     def __init__(self) -> None:
         self.own: Announcement | None = None
         self.yields = False
-        self.asks = False
+        self.asks = self.held_up = False
         self.wished: Path | None = None
         self._name = ""
         self._channel: Channel | None = None
@@ -159,7 +157,8 @@ class Traffic:
     def _publish(self, announcement: Announcement) -> None:
         if self._channel is None:
             return
-        own = replace(announcement, name=self._name, asks=self.asks, wishes=self.wished is not None)
+        asks, wishes = self.asks or self.held_up, self.wished is not None
+        own = replace(announcement, name=self._name, asks=asks, wishes=wishes)
         meeting = self._meeting
         if meeting is not None and own.remaining > 0.0:  # one that has arrived has nothing left
             own = replace(own, remaining=meeting.remaining, cannot_yield=meeting.cannot_yield, waits=meeting.waits)
@@ -207,7 +206,7 @@ class Traffic:
             self._publish(own)
 
     def ask(self, asks: bool) -> None:
-        """Announce whether this robot waits for those that stand in its way without a goal."""
+        """Announce whether this robot waits for those that stand in its way without a goal, while it does not drive."""
         self.asks, own = asks, self.own
         if own is not None:
             self._publish(own)

@@ -14,6 +14,7 @@ from terrain.scenarios.places import PlanarPose
 from terrain.scenarios.robots import OwnRobot, Sensor
 from terrain.scenarios.scenario import Scenario
 from terrain.scenarios.world_types import MapWorld
+from terrain.session.executives import make_executive
 from terrain.session.fleet import FleetSession
 from terrain.session.simulation_session import SessionOptions
 
@@ -78,18 +79,34 @@ def contacts(fleet):
     return [one for session in fleet.sessions.values() for one in session.simulation.incidents if one.kind in CONTACTS]
 
 
+def assert_ben_pulled_out_and_came_back(made):
+    made.clock.sleep(40.0)
+    ben = made.sessions["ben"]
+    home = ben.goals[0]
+    track = ben.recorder.finish().poses[:, :2]
+    assert np.linalg.norm(track - [home.x, home.y], axis=1).max() > 0.6, "it pulled out"
+    assert ben.robot.pose().distance_to(home) < 0.3
+    assert contacts(made) == []
+
+
 @pytest.mark.parametrize("recoveries", [None, ()], ids=["all recoveries", "nothing clears"])
-@pytest.mark.parametrize("x", [3.6, 7.0])
-def test_it_pulls_out_touches_nobody_and_comes_back(fleet, x, recoveries):
-    made = fleet(x)
-    result, ben = drive_through(made, recoveries), made.sessions["ben"]
+def test_it_pulls_out_touches_nobody_and_comes_back(fleet, recoveries):
+    made = fleet(3.6)
+    result = drive_through(made, recoveries)
     assert result.success, result.message
     assert recoveries_of(made.sessions["anna"])[0] == "give_way", "it asks, before it forgets who stands there"
-    made.clock.sleep(40.0)
-    track = ben.recorder.finish().poses[:, :2]
-    assert np.linalg.norm(track - [x, 2.0], axis=1).max() > 0.6, "it pulled out"
-    assert ben.robot.pose().distance_to(ben.goals[0]) < 0.3
-    assert contacts(made) == []
+    assert_ben_pulled_out_and_came_back(made)
+
+
+@pytest.mark.parametrize("executive", ["move_base", "navigation"])
+def test_one_that_sees_it_only_while_it_drives_asks_before_it_has_come_up_to_it(fleet, executive):
+    """Without that it takes 28 to 36 s, and stands before it until its controller's patience is over."""
+    made = fleet(7.0)
+    anna, begun = made.sessions["anna"], made.clock.now()
+    result = make_executive(executive, anna.navigator).drive(anna.goals[0])
+    assert result.success, result.message
+    assert recoveries_of(anna) == [] and made.clock.now() - begun < 25.0
+    assert_ben_pulled_out_and_came_back(made)
 
 
 def test_without_it_the_other_one_does_not_get_through(fleet):
