@@ -105,7 +105,8 @@ class WebSocketServer(Generic[AnyVisitor]):
         self._started.wait(TIME_TO_START)
         if self._problem is not None:
             host, port = self._options.access.host, self._options.port
-            raise ServerError(f"cannot listen at {host}:{port}: {self._problem}") from self._problem
+            reason = str(self._problem).rpartition("): ")[2]  # without the address, which asyncio repeats
+            raise ServerError(f"cannot listen at {host}:{port}: {reason}") from self._problem
 
     def post(self, call: Callable[..., None], *arguments: Any) -> None:
         """Have a function called on the event loop; never waits, and does nothing once the server is closed."""

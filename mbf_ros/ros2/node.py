@@ -25,6 +25,7 @@ from mbf_ros.ros2.clock import RosClock, SimulatedRosClock
 from mbf_ros.ros2.conversion import interface_class
 from mbf_ros.ros2.nav2 import offers_names, serve_actions
 from mbf_ros.ros2.nav2_services import Nav2Services
+from mbf_ros.ros2.neighbours import Mismatches, Namesakes
 from mbf_ros.ros2.options import NodeOptions
 from mbf_ros.ros2.parameters import NodeParameters
 from mbf_ros.ros2.robot import Arrivals, Frames
@@ -38,6 +39,7 @@ NODE = "move_base_flex"
 CLOCK = "/clock"
 CALENDAR_PERIOD = 0.1  # s between two looks at the calendar
 CLIENT_PERIOD = 0.5  # s of real time between two looks at who is gone
+NEIGHBOUR_PERIOD = 2.0  # s of real time between two looks at who does not work with us
 
 
 @contextmanager
@@ -102,6 +104,8 @@ class NavigationNode(RobotNavigation):
         self._actions = [ServedAction(self._node, f"~/{name}", *action, serving) for name, action in ACTIONS.items()]
         if not self._options.keep_goals:
             self._repeat(CLIENT_PERIOD, self._cancel_abandoned)
+        for neighbours in (Namesakes(self._node), Mismatches(self._node)):
+            self._repeat(NEIGHBOUR_PERIOD, neighbours.look)
         queries = ServedQueries(self._node, server, self._context)
         if offers_names(self._node, self._options.nav2, self._real_time):
             self._actions += serve_actions(self._node, server, serving)

@@ -131,6 +131,7 @@ class RobotNavigator(RobotNavigation):
         }
         self._served.set()
         self._links.post([*self._topics.requests(), *self._shown.greeting()])
+        self._shown.begin()
 
     # ------------------------------------------------------------------------------------------- the connections
     def _data_greeting(self) -> list[str]:

@@ -126,11 +126,17 @@ class ShownTopics:
         self._connection = connection
         self._messages = NavigatorMessages(session, real_time, context, _audience, problems, robot_localizes=True)
         self._last: dict[str, str] = {}
-        self._ticker = Ticker(real_time, session.events, self._publish, PERIOD, "robot link publisher")
+        self._session, self._real_time = session, real_time
+        self._ticker: Ticker | None = None
+
+    def begin(self) -> None:
+        """Publish from now on; the greeting has to be sent before, as it advertises the topics."""
+        self._ticker = Ticker(self._real_time, self._session.events, self._publish, PERIOD, "robot link publisher")
 
     def close(self) -> None:
         """Publish no more."""
-        self._ticker.stop()
+        if self._ticker is not None:
+            self._ticker.stop()
         self._messages.close()
 
     def greeting(self) -> list[str]:

@@ -2,6 +2,7 @@
 
 import json
 import signal
+import socket
 import subprocess
 import sys
 
@@ -68,6 +69,13 @@ def test_what_cannot_be_served_is_refused_with_one_text(config, options, text):
     result = CliRunner().invoke(make_app(), ["bridge", "serve", str(config), *options])
     assert result.exit_code == 2
     assert text in result.output
+
+
+def test_a_port_that_is_taken_is_named_in_a_few_words(config):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        result = CliRunner().invoke(make_app(), ["bridge", "serve", str(config), "--port", str(port)])
+    assert result.output.endswith(f"error: cannot listen at 127.0.0.1:{port}: address already in use\n")
 
 
 def test_what_is_neither_file_nor_scenario_is_named(tmp_path):

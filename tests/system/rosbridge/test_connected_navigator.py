@@ -73,6 +73,11 @@ def test_a_goal_of_another_client_drives_the_robot_and_its_plan_is_shown(driven,
     assert plans or sender.wait("publish", topic="/plan")
 
 
+def test_nothing_is_published_before_it_is_advertised(driven):
+    made, _ = driven()
+    assert not [text for text in made.reports.values if "was not advertised" in text]
+
+
 def test_goals_are_canceled_taken_over_and_refused_as_by_a_navigator_of_our_own(driven):
     made, sender = driven()
     first = sender.send("/move_base_flex/move_base", target_pose=pose(*FAR))
