@@ -163,7 +163,7 @@ def build_surface(
     faces = faces_of_patches(patches.heights, links, ~is_obstacle)
     is_kept = _is_large(patches, faces, chosen.least_area)
     if not is_kept.any():
-        raise MeshError("point cloud", [f"there is no surface of {chosen.least_area:g} m² in it"], _hint_on_up(points))
+        raise MeshError("point cloud", [f"there is no surface of {chosen.least_area:g} m² in it"], _hint_on(points))
     is_used, is_small = _of_faces(patches, faces[is_kept]), _of_faces(patches, faces[~is_kept])
     faces = faces[is_kept]
     on_step("error")
@@ -176,10 +176,13 @@ def build_surface(
     )
 
 
-def _hint_on_up(points: FloatArray) -> str:
-    """What to try where points (n, 3) [m] seem to lie on their side; empty where they do not."""
-    flattest = "xyz"[int(np.argmin(np.ptp(points, axis=0)))]
-    return f"It is flattest along {flattest}: if that is up, choose --up {flattest}" if flattest != "z" else ""
+def _hint_on(points: FloatArray) -> str:
+    """What may be wrong with points (n, 3) [m] without a surface: on their side, or all of one height; else empty."""
+    extent = np.ptp(points, axis=0)
+    flattest = "xyz"[int(np.argmin(extent))]
+    if flattest != "z":
+        return f"It is flattest along {flattest}: if that is up, choose --up {flattest}"
+    return "A planar scanner sees walls and no ground; a 3D sensor is needed" if extent[2] < SMALLEST_CELL else ""
 
 
 def cell_for(points: FloatArray) -> float:

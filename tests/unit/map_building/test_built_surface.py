@@ -195,6 +195,16 @@ def test_points_that_are_no_map_are_refused(points, text):
         build_surface(points)
 
 
+def test_walls_at_one_height_are_known_for_those_of_a_planar_scanner(rng):
+    along = rng.uniform(0.0, 10.0, 4000)
+    walls = [
+        np.column_stack(pair) for pair in ((along, 0.0 * along), (0.0 * along, along), (along, 10.0 + 0.0 * along))
+    ]
+    points = np.column_stack([np.vstack(walls) + rng.normal(0.0, 0.01, (12000, 2)), np.full(12000, 0.2)])
+    with pytest.raises(MeshError, match="A planar scanner sees walls and no ground; a 3D sensor is needed"):
+        build_surface(points)
+
+
 def test_too_large_a_grid_is_refused():
     corners = np.random.default_rng(1).uniform(0.0, 1.0, (200, 3))
     corners[50:100, 0] += 40_000.0
