@@ -27,6 +27,7 @@ from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.server.making_room import MakingRoom
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.traffic.announcement import DIGITS, Announcement
+from mbf_abstract.traffic.right_of_way import MEETING_LENGTH
 from mbf_abstract.traffic.traffic import ANOTHER_GOAL, Channel
 
 LENGTH = 12.0
@@ -115,13 +116,16 @@ class Announcer:
 
     def _ask_ahead(self, now: float) -> None:
         """Ask who stands on the path that is driven for room while plans beside the drive find none."""
-        traffic, was_held_up = self._server.runtime.traffic, self._server.runtime.traffic.held_up
+        runtime = self._server.runtime
         if not self._server.exe_path.busy:
             self._failed = -math.inf
-        traffic.held_up = now - self._failed < ASKS_FOR
-        if traffic.held_up and not was_held_up:
-            text = "finds no path beside its drive, and asks who stands on its path for room"
-            self._server.runtime.events.emit(EventKind.CUSTOM, "announcer", message=text)
+        distance = distance_of_meetings(runtime, self._server.plugins) if now - self._failed < ASKS_FOR else 0.0
+        rivals = runtime.traffic.rivals(now, distance, MEETING_LENGTH) if distance > 0.0 else ()
+        asked = [rival.name for rival in rivals if rival.makes_room]
+        if asked and not runtime.traffic.held_up:
+            text = f"finds no path beside its drive, and asks {', '.join(asked)} for room"
+            runtime.events.emit(EventKind.CUSTOM, "announcer", message=text)
+        runtime.traffic.held_up = bool(asked)
 
     def _note_plan(self, handle: AnyGoalHandle) -> None:
         """Note whether there is a path from where the robot drives to the end of the one that it follows."""

@@ -101,7 +101,7 @@ class Traffic:
     yields : bool
         Whether it is letting others pass: then it announces where it is, and not where it wants to go.
     asks, held_up : bool
-        Whether it waits, see ``ask``, or drives and finds no other path: it announces of both that it asks.
+        Whether it waits for others, see ``ask``, or drives up to some and finds no other path: it asks in both cases.
     wished : Path or None
         What the robot would follow, see ``wish``.
     """

@@ -11,7 +11,7 @@ from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanResult
 from mbf_abstract.server.announcer import ASKS_FOR, Announcer
-from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, straight_plan
 from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.traffic import SharedChannel, Traffic
 
@@ -20,16 +20,23 @@ NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "somebody stands there")
 BEN = Announcement("ben", 0.0, np.array([(3.0, 0.0, 0.0)]), 0.0, radius=0.2, makes_room=True)
 
 
+class GiveWay(ScriptedRecovery):
+    meeting_distance = 0.6
+
+
+PLUGINS = {"planner": ScriptedPlanner, "controller": ScriptedController, "give_way": GiveWay}
+
+
 @pytest.fixture
 def anna(make_session):
     """Anna, who drives along x to ``END``; ``heard()`` is what she announces now, ``ben`` who stands on her path."""
-    session, channel = make_session(planner_max_retries=0), SharedChannel()
+    session, channel = make_session(PLUGINS, planner_max_retries=0), SharedChannel()
     announcer = Announcer(session.server, "anna", channel)
     session.ben = Traffic()
     session.ben.connect("ben", channel)
 
-    def heard():
-        session.ben.announce(replace(BEN, stamp=session.clock.now()))
+    def heard(**changes):
+        session.ben.announce(replace(BEN, stamp=session.clock.now(), **changes))
         announcer.announce()
         return channel.latest()[0]
 
@@ -59,7 +66,7 @@ def test_it_is_said_once_in_the_event_log(anna):
         plan(anna)
         anna.heard()
     said = [event for event in anna.recorded(EventKind.CUSTOM) if event.source == "announcer"]
-    assert len(said) == 1
+    assert [event.data["message"] for event in said] == ["finds no path beside its drive, and asks ben for room"]
 
 
 def test_a_plan_that_succeeds_ends_it(anna):
@@ -112,6 +119,27 @@ def test_a_plan_that_fails_counts_for_a_while_as_some_plan_only_where_their_path
     assert anna.heard().asks
 
 
+@pytest.mark.parametrize(
+    "ben",
+    [
+        {"makes_room": False},
+        {"cannot_yield": True},
+        {"path": np.array([(3.0, 1.0, 0.0)])},
+        {"path": np.array([(-1.0, 0.0, 0.0)])},
+    ],
+    ids=["has a goal", "no place to make room", "stands beside", "stands behind"],
+)
+def test_without_somebody_who_makes_room_on_the_path_nobody_is_asked(anna, ben):
+    plan(anna)
+    assert not anna.heard(**ben).asks
+
+
+def test_a_robot_that_runs_nothing_in_meetings_asks_nobody(anna):
+    anna.server.set_parameters(right_of_way_behavior="")
+    plan(anna)
+    assert not anna.heard().asks
+
+
 def test_a_plan_to_another_place_does_not_end_it(anna):
     plan(anna)
     plan(anna, straight_plan, Pose.planar(2.0, 3.0))
@@ -119,9 +147,10 @@ def test_a_plan_to_another_place_does_not_end_it(anna):
 
 
 def test_a_plan_that_fails_before_the_drive_does_not_count(make_session):
-    session, channel = make_session(planner_max_retries=0), SharedChannel()
+    session, channel = make_session(PLUGINS, planner_max_retries=0), SharedChannel()
     announcer = Announcer(session.server, "anna", channel)
     plan(session)
+    channel.publish(BEN)
     session.navigator.send(ExePathGoal(Path.from_poses([Pose.planar(0.0, 0.0), END])))
     session.clock.sleep(0.5)
     announcer.announce()
