@@ -57,4 +57,5 @@ def _check_interface(host: str) -> None:
         with socket.create_server((host, 0), family=family):
             pass
     except OSError as error:
-        raise ViewerMissing(f"cannot listen at {host!r}, which is no interface of this machine: {error}") from error
+        reason = (error.strerror or str(error)).partition(" (while")[0]  # without the address, which Python repeats
+        raise ViewerMissing(f"cannot listen at {host!r}, which is no interface of this machine: {reason}") from error
