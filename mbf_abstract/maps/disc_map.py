@@ -17,8 +17,8 @@ from mbf_abstract.config.findings import describe_value
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.controllers.failures import obstacle_text
-from mbf_abstract.maps.navigation_map import NavigationMap, PlaceCheck
-from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.maps.navigation_map import NavigationMap
+from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceCheck, PlaceQuery, PoseAnswer
 from mbf_abstract.parameters import ParameterError
 
 STRIDE = 0.05

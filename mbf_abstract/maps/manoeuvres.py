@@ -13,11 +13,16 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
+from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.kernels.steps import steps_from
+from mbf_abstract.maps.queries import PlanarPose, PlaneCheck
 
 CELL = 0.15  # m; poses of one heading that share a cell are one state
 HEADINGS = 16
@@ -30,9 +35,6 @@ GEAR_CHANGE_COST = 0.2  # m
 MOST_STATES = 20_000
 LEAST_LEFT = 0.01
 """How far [m] it is, at least, from every pose at which a manoeuvre may not end."""
-
-PlanarPose = tuple[float, float, float]
-"""x, y [m] and heading [rad] in a plane."""
 
 
 @dataclass(frozen=True)
@@ -53,24 +55,22 @@ class Step:
     poses: tuple[PlanarPose, ...]
     cost: float
 
-    def begun_at(self, begin: PlanarPose) -> Step:
-        """Return the same step from another pose than the origin."""
-        x, y, yaw = begin
-        c, s = math.cos(yaw), math.sin(yaw)
-        moved = [(x + c * ahead - s * left, y + s * ahead + c * left, yaw + turn) for ahead, left, turn in self.poses]
-        return Step(self.gear, tuple(moved), self.cost)
-
 
 class _State(NamedTuple):
+    """Where a manoeuvre leads: its cost, its end and what is left there, its last step and the state before."""
+
     cost: float
     pose: PlanarPose
-    step: Step | None
+    key: tuple[int, int, int]
+    left: float
+    kind: Step | None
+    poses: FloatArray
     before: _State | None
 
 
 def find_manoeuvre(
-    is_free: Callable[[PlanarPose], bool],
-    left: Callable[[PlanarPose], float],
+    fits: PlaneCheck,
+    left: Callable[[FloatArray], FloatArray],
     most: float,
     turning_radius: float = 0.0,
     is_canceled: Callable[[], bool] = lambda: False,
@@ -79,10 +79,10 @@ def find_manoeuvre(
 
     Parameters
     ----------
-    is_free : callable
-        Whether the robot may stand at a pose; not asked about the origin.
+    fits : callable
+        Whether the robot may stand at poses; not asked about the origin.
     left : callable
-        How far [m] it is from a pose to the nearest place to end at, at least; 0 there.
+        How far [m] (n,) it is from poses (n, 3) to the nearest place to end at, at least; 0 there.
     most : float
         Greatest cost [m] of the manoeuvre: its length, and what turns on the spot and changes of gear count.
     turning_radius : float
@@ -95,24 +95,50 @@ def find_manoeuvre(
     list of Step or None
         None if there is no such place, or it was canceled.
     """
-    kinds = kinds_of_steps(turning_radius)
-    settled: set[tuple[int, int, int]] = set()
-    queue, count = [(0.0, 0, _State(0.0, (0.0, 0.0, 0.0), None, None))], 0
+    kinds, origin = kinds_of_steps(turning_radius), np.zeros((1, 3))
+    steps, settled = _aligned(kinds), set[tuple[int, int, int]]()
+    start = _State(0.0, (0.0, 0.0, 0.0), (0, 0, 0), float(left(origin)[0]), None, origin, None)
+    queue, count = [(0.0, 0, start)], 0
     while queue and len(settled) < MOST_STATES and not is_canceled():
         _, _, state = heapq.heappop(queue)
-        if _key(state.pose) in settled:
+        if state.key in settled:
             continue
-        settled.add(_key(state.pose))
-        if left(state.pose) <= 0.0:
+        settled.add(state.key)
+        if state.left <= 0.0:
             return _steps_to(state)
-        for kind in kinds:
-            step = kind.begun_at(state.pose)
-            end, cost = step.poses[-1], state.cost + step.cost + _gear_change(state.step, step)
-            if _key(end) in settled or cost + left(end) > most or not all(map(is_free, step.poses)):
-                continue
+        for following in _states_after(state, kinds, steps_from(*state.pose, steps), settled, left, most, fits):
             count += 1  # of states that promise the same the older one is looked at first
-            heapq.heappush(queue, (cost + left(end), count, _State(cost, end, step, state)))
+            heapq.heappush(queue, (following.cost + following.left, count, following))
     return None
+
+
+def _states_after(
+    state: _State,
+    kinds: list[Step],
+    poses: FloatArray,
+    settled: set[tuple[int, int, int]],
+    left: Callable[[FloatArray], FloatArray],
+    most: float,
+    fits: PlaneCheck,
+) -> Iterator[_State]:
+    """Yield the states after one step of each kind, along poses (k, m, 3), that are new, free, and near enough."""
+    ends, keys = poses[:, -1], _keys(poses[:, -1])
+    costs = [state.cost + kind.cost + _gear_change(state.kind, kind) for kind in kinds]
+    new = [index for index, key in enumerate(keys) if key not in settled]
+    lefts = dict(zip(new, left(ends[new]).tolist(), strict=True)) if new else {}
+    near = [index for index, rest in lefts.items() if costs[index] + rest <= most]
+    for index in _free(poses, near, fits):
+        x, y, yaw = ends[index].tolist()
+        yield _State(costs[index], (x, y, yaw), keys[index], lefts[index], kinds[index], poses[index], state)
+
+
+def _free(poses: FloatArray, steps: list[int], fits: PlaneCheck) -> list[int]:
+    """Those of some steps, of poses (k, m, 3), all poses of which are free; the ends, which many are not at, first."""
+    for part in (poses[:, -1:], poses[:, :-1]):
+        if steps:
+            free = fits(part[steps].reshape(-1, 3)).reshape(len(steps), -1)
+            steps = [step for step, are_free in zip(steps, free.tolist(), strict=True) if all(are_free)]
+    return steps
 
 
 def driven_back(steps: Sequence[Step]) -> list[Step]:
@@ -148,15 +174,24 @@ def _gear_change(before: Step | None, step: Step) -> float:
     return GEAR_CHANGE_COST if before is not None and step.gear * before.gear < 0 else 0.0
 
 
-def _key(pose: PlanarPose) -> tuple[int, int, int]:
-    x, y, yaw = pose
-    return round(x / CELL), round(y / CELL), round(yaw / HEADING) % HEADINGS
+def _aligned(kinds: list[Step]) -> FloatArray:
+    """Poses (k, m, 3) of steps from the origin; shorter steps stay at their end."""
+    most = max(len(kind.poses) for kind in kinds)
+    return np.array([[*kind.poses, *[kind.poses[-1]] * (most - len(kind.poses))] for kind in kinds])
+
+
+def _keys(poses: FloatArray) -> list[tuple[int, int, int]]:
+    """States of poses (n, 3)."""
+    cells = np.rint(poses / (CELL, CELL, HEADING)).astype(np.int64)
+    cells[:, 2] %= HEADINGS
+    return [(column, row, heading) for column, row, heading in cells.tolist()]
 
 
 def _steps_to(state: _State) -> list[Step]:
     steps: list[Step] = []
     at: _State | None = state
-    while at is not None and at.step is not None:
-        steps.append(at.step)
+    while at is not None and at.kind is not None:
+        poses = tuple((x, y, yaw) for x, y, yaw in at.poses[: len(at.kind.poses)].tolist())
+        steps.append(Step(at.kind.gear, poses, at.kind.cost))
         at = at.before
     return steps[::-1]

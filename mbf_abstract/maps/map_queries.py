@@ -12,8 +12,15 @@ from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.arrival_tolerance import plan_tolerance_problem
-from mbf_abstract.maps.navigation_map import PlaceCheck
-from mbf_abstract.maps.queries import AS_CONFIGURED, CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.maps.queries import (
+    AS_CONFIGURED,
+    CellState,
+    PathAnswer,
+    PlaceAnswer,
+    PlaceCheck,
+    PlaceQuery,
+    PoseAnswer,
+)
 from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.maps.tracking.blocking import Blockage, blockages
 from mbf_abstract.maps.tracking.objects import TrackedObject

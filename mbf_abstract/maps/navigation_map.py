@@ -9,31 +9,23 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
+from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.avoided_places import AvoidedPlace
-from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.maps.queries import CellState, PlaceCheck, PlaceQuery, PlaneCheck, PoseAnswer, each_pose
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.contact import SAME_STOREY
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.maps.tracking.robot_box import RobotBox
 from mbf_abstract.maps.view import FloorMap, FloorWindow
 
-PlaceCheck = Callable[[Pose], PlaceAnswer]
-"""State and cost at a pose in the frame of the map."""
-
 
 class NavigationMap(ABC):
-    """A map. All poses are in its frame; its methods may be called from any thread.
-
-    Attributes
-    ----------
-    layers : mapping of name to layer
-        Each layer has its ``parameters``.
-    """
+    """A map. All poses are in its frame; its methods may be called from any thread; layers have ``parameters``."""
 
     frame_id: str
     layers: Mapping[str, Any] = MappingProxyType({})
@@ -105,7 +97,7 @@ class NavigationMap(ABC):
     # -------------------------------------------------------------------------------------------------- places
     @abstractmethod
     def point_check(self) -> PlaceCheck:
-        """Return a function that gives state and cost of points, on the present map."""
+        """A function: state and cost of points, on the present map."""
 
     def first_outside(self, positions: FloatArray) -> int:
         """Index of the first of the positions (n, 3) [m] of a path that is not on the map; -1 if all are, or may be.
@@ -129,6 +121,14 @@ class NavigationMap(ABC):
         Maps that plan by something else than what an outline touches say here what they plan by.
         """
         return self.pose_check(query)
+
+    def plane_check(self, query: PlaceQuery, frame: Transform) -> PlaneCheck:
+        """Whether ``pose_check`` finds the robot to fit, at many poses in the plane of a frame."""
+        return each_pose(self.pose_check(query), frame)
+
+    def plane_path_check(self, query: PlaceQuery, frame: Transform) -> PlaneCheck:
+        """As ``plane_check``, by what ``path_check`` says."""
+        return each_pose(self.path_check(query), frame)
 
     @abstractmethod
     def find_valid_pose(

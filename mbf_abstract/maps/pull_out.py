@@ -17,15 +17,19 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm, rotated_back
 from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.maps.manoeuvres import CHECKED_EVERY, PlanarPose, Step, find_manoeuvre
+from mbf_abstract.maps.kernels.steps import distances_from_points
+from mbf_abstract.maps.manoeuvres import CHECKED_EVERY, Step, find_manoeuvre
 from mbf_abstract.maps.navigation_map import NavigationMap
-from mbf_abstract.maps.queries import PADDED, CellState, PlaceQuery
+from mbf_abstract.maps.queries import PADDED, CellState, PlaceQuery, on_map
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.traffic.right_of_way import STOREY
+
+BoolArray = NDArray[np.bool_]
 
 PATH_SPACING = 0.1  # m
 ROOM = 0.05  # m
@@ -66,12 +70,12 @@ def find_pull_out(
         None if there is no such place, or it was canceled.
     """
     for room, farther in ((ROOM, AT_EASE), (0.0, SHORT)):
-        is_free = _Freedom(navigation_map, start, room).is_free
+        are_free = _Freedom(navigation_map, start, room).are_free
 
-        def left(pose: PlanarPose, wanted: float = distance + farther) -> float:
-            return max(wanted - float(norm(keep_free - np.array(pose[:2])).min()), 0.0)
+        def left(poses: FloatArray, wanted: float = distance + farther) -> FloatArray:
+            return np.asarray(np.maximum(wanted - distances_from_points(keep_free, poses), 0.0))
 
-        steps = find_manoeuvre(is_free, left, reach, turning_radius, is_canceled)
+        steps = find_manoeuvre(are_free, left, reach, turning_radius, is_canceled)
         if steps is not None:
             return steps
     return None
@@ -90,41 +94,52 @@ class _Freedom:
         self._map, self._room = navigation_map, room
         self._frame = Transform(start.position, start.orientation, start.frame_id, "begin")
         roomy = PlaceQuery(use_padded_footprint=True, safety_dist=room)
-        self._with_room, self._outline = navigation_map.pose_check(roomy), navigation_map.pose_check(PADDED)
-        self._roomy_way, self._way = navigation_map.path_check(roomy), navigation_map.path_check(PADDED)
+        self._outline, self._way = navigation_map.pose_check(PADDED), navigation_map.path_check(PADDED)
+        self._fits = navigation_map.plane_check(roomy, self._frame)
+        self._is_ground = navigation_map.plane_path_check(roomy, self._frame)
+        self._roomy_way = navigation_map.path_check(roomy)
         self._stands_on = self._roomy_way(start)
         self._plans_by_outline = type(navigation_map).path_check is NavigationMap.path_check
-        self._is_near = self._with_room(start).state > CellState.INSCRIBED
+        self._is_near = navigation_map.pose_check(roomy)(start).state > CellState.INSCRIBED
         self._least_gap = _gap(navigation_map, start) if self._is_near else math.inf
 
-    def is_free(self, pose: PlanarPose) -> bool:
-        """Whether it may stand at a pose."""
+    def are_free(self, poses: FloatArray) -> BoolArray:
+        """Whether it may stand (n,) at poses (n, 3)."""
+        fits = self._fits(poses)
+        free = fits.copy()
+        if not self._plans_by_outline:  # which touches nothing
+            free[fits] = self._are_ways(poses[fits])
+        if self._is_near:
+            for index in np.flatnonzero(~fits).tolist():
+                free[index] = self._may_leave(poses[index])
+        return free
+
+    def _may_leave(self, pose: FloatArray) -> bool:
+        """Whether it may stand where something is within its room, as it leaves."""
         there = self._at(pose)
-        if self._with_room(there).state <= CellState.INSCRIBED:
-            return self._is_way(pose, there)
-        if not self._is_near or math.hypot(*pose[:2]) > LEAVING or _gap(self._map, there) < self._least_gap:
+        if math.hypot(*pose[:2].tolist()) > LEAVING or _gap(self._map, there) < self._least_gap:
             return False
         fits = self._outline(there).state <= CellState.INSCRIBED
-        return self._room == 0.0 or (fits and self._is_way(pose, there))
+        return self._room == 0.0 or (fits and (self._plans_by_outline or bool(self._are_ways(pose[None])[0])))
 
-    def _is_way(self, pose: PlanarPose, there: Pose) -> bool:
-        """Whether it may drive here; as it leaves ground without room, also if only nothing stops it."""
-        if self._plans_by_outline:  # which touches nothing
-            return True
-        ground, (x, y, yaw) = self._roomy_way(there), pose
-        if ground.state <= CellState.INSCRIBED:
-            return True
-        if self._stands_on.state <= CellState.INSCRIBED or math.hypot(x, y) > LEAVING:
-            return False
+    def _are_ways(self, poses: FloatArray) -> BoolArray:
+        """Whether it may drive (n,) at poses (n, 3); as it leaves ground without room, also where nothing stops it."""
+        ground = self._is_ground(poses)
+        if self._stands_on.state > CellState.INSCRIBED:
+            for index in np.flatnonzero(~ground).tolist():
+                ground[index] = math.hypot(*poses[index, :2].tolist()) <= LEAVING and self._may_cross(poses[index])
+        return ground
+
+    def _may_cross(self, pose: FloatArray) -> bool:
+        """Whether it may drive over ground without room, as it leaves."""
         if self._room == 0.0:
-            return ground.cost <= self._stands_on.cost
-        ahead, left = BETWEEN * math.cos(yaw), BETWEEN * math.sin(yaw)
-        around = (there, self._at((x + ahead, y + left, yaw)), self._at((x - ahead, y - left, yaw)))
-        return all(self._way(one).state <= CellState.INSCRIBED for one in around)
+            return self._roomy_way(self._at(pose)).cost <= self._stands_on.cost
+        ahead = BETWEEN * np.array([math.cos(pose[2]), math.sin(pose[2]), 0.0])
+        return all(self._way(self._at(one)).state <= CellState.INSCRIBED for one in (pose, pose + ahead, pose - ahead))
 
-    def _at(self, pose: PlanarPose) -> Pose:
-        x, y, yaw = pose
-        return self._frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id="begin"))
+    def _at(self, pose: FloatArray) -> Pose:
+        x, y, yaw = pose.tolist()
+        return on_map(self._frame, (x, y, yaw))
 
 
 def _gap(navigation_map: NavigationMap, pose: Pose) -> float:

@@ -7,10 +7,22 @@ one counts.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
-from mbf_abstract.geometry import Pose
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import FloatArray, Pose
+from mbf_abstract.geometry.transform import Transform, rotate
+
+PlanarPose = tuple[float, float, float]
+"""x, y [m] and heading [rad] in a plane."""
+
+PlaneCheck = Callable[[FloatArray], NDArray[np.bool_]]
+"""Whether the robot fits (n,) at poses (n, 3: x, y [m], heading [rad]) in the plane of a frame."""
 
 
 class CellState(IntEnum):
@@ -104,3 +116,31 @@ AS_CONFIGURED = PlaceQuery()
 
 PADDED = PlaceQuery(use_padded_footprint=True)
 """The robot with its padded outline, as controllers and recoveries check it."""
+
+
+PlaceCheck = Callable[[Pose], PlaceAnswer]
+"""State and cost at a pose in the frame of the map."""
+
+
+def on_map(frame: Transform, pose: PlanarPose) -> Pose:
+    """Return a pose in the plane of ``frame``, in that frame's parent."""
+    x, y, yaw = pose
+    return frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id=frame.child))
+
+
+def in_plane(frame: Transform, poses: FloatArray) -> FloatArray:
+    """Positions (n, 3) [m], in the parent of ``frame``, of poses (n, 3) in its plane; each as of ``on_map``."""
+    seen: Any = (poses[:, 0], poses[:, 1], 0.0)  # of all at once, in the arithmetic of one
+    positions = np.empty((len(poses), 3))
+    positions[:, 0], positions[:, 1], positions[:, 2] = rotate(frame.rotation, seen)
+    return positions + frame.translation
+
+
+def each_pose(check: PlaceCheck, frame: Transform) -> PlaneCheck:
+    """Return the check of poses in the plane of ``frame`` that asks one after the other: FREE or INSCRIBED fits."""
+    return one_by_one(lambda pose: check(on_map(frame, pose)).state <= CellState.INSCRIBED)
+
+
+def one_by_one(function: Callable[[PlanarPose], Any]) -> Callable[[FloatArray], NDArray[Any]]:
+    """Return the function of many poses (n, 3) that calls ``function`` for each."""
+    return lambda poses: np.array([function((x, y, yaw)) for x, y, yaw in poses.tolist()])

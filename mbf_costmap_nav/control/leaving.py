@@ -8,7 +8,8 @@ import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.maps.manoeuvres import LEAST_LEFT, PlanarPose
+from mbf_abstract.maps.manoeuvres import LEAST_LEFT
+from mbf_abstract.maps.queries import PlanarPose
 from mbf_costmap_nav.grid.costmap import UNKNOWN, CellBox, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.motion_check import blocked_cells

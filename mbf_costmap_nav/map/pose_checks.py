@@ -18,12 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.maps.navigation_map import PlaceCheck
-from mbf_abstract.maps.queries import AS_CONFIGURED, CellState, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.maps.queries import (
+    AS_CONFIGURED,
+    CellState,
+    PlaceAnswer,
+    PlaceCheck,
+    PlaceQuery,
+    PlaneCheck,
+    PoseAnswer,
+)
 from mbf_costmap_nav.grid.collision import footprint_costs
 from mbf_costmap_nav.grid.costmap import INSCRIBED, LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.kernels.map.free_pose import first_fitting_pose
+from mbf_costmap_nav.kernels.map.free_pose import first_fitting_pose, fitting_poses
 
 DEFAULT_ANGLE_INCREMENT = math.radians(5.0)
 FIRST_RING = 64
@@ -59,6 +67,16 @@ def pose_check(costmap: Costmap, footprint: Footprint, query: PlaceQuery = AS_CO
         return PlaceAnswer(costs.state, costs.weighted_sum(*multipliers), known)
 
     return check
+
+
+def plane_check(costmap: Costmap, footprint: Footprint, frame: Transform, safety_dist: float) -> PlaneCheck:
+    """As ``pose_check``: whether the footprint, grown by a distance [m], fits at poses in the plane of ``frame``."""
+    vertices = footprint.offset(safety_dist).vertices
+    outline = np.array(vertices) if len(vertices) >= 3 else np.zeros((1, 2))
+    grid = costmap.origin_x, costmap.origin_y, costmap.resolution
+    return lambda poses: np.asarray(
+        fitting_poses(costmap.cells, *grid, outline, frame.translation, frame.rotation, poses)
+    )
 
 
 def find_valid_pose(

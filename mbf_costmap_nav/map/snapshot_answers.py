@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
+from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.layered_map import LayeredMap
-from mbf_abstract.maps.navigation_map import PlaceCheck
-from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
+from mbf_abstract.maps.queries import PlaceCheck, PlaceQuery, PlaneCheck, PoseAnswer
 from mbf_abstract.maps.tracking.robot_box import RobotBox
 from mbf_costmap_nav.grid.contact import contact_depth
 from mbf_costmap_nav.grid.costmap import Costmap
@@ -84,6 +84,10 @@ class SnapshotAnswers(LayeredMap):
         if center_only:
             return pose_checks.pose_check(self.snapshot(), Footprint([]), replace(query, safety_dist=0.0))
         return pose_checks.pose_check(self.snapshot(), self._outline(query), query)
+
+    def plane_check(self, query: PlaceQuery, frame: Transform) -> PlaneCheck:
+        """As ``pose_check``, for all poses in one kernel."""
+        return pose_checks.plane_check(self.snapshot(), self._outline(query), frame, query.safety_dist)
 
     def find_valid_pose(
         self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery

@@ -18,8 +18,9 @@ from typing import ClassVar
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
-from mbf_abstract.maps.manoeuvres import PlanarPose, Step, find_manoeuvre, radius_beyond
+from mbf_abstract.maps.manoeuvres import Step, find_manoeuvre, radius_beyond
 from mbf_abstract.maps.pull_out import ROOM
+from mbf_abstract.maps.queries import PlanarPose, one_by_one
 from mbf_abstract.maps.recoveries.manoeuvre_recovery import ManoeuvreParameters, ManoeuvreRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -148,7 +149,8 @@ class EscapeRecovery(CostmapRecovery, ManoeuvreRecovery):
             def may_pass(pose: PlanarPose, room: float = room) -> bool:
                 return all(one.may_pass(pose, room) for one in maps)
 
-            steps = find_manoeuvre(may_pass, left, p.max_distance, turning_radius, lambda: token.cancelled)
+            questions = one_by_one(may_pass), one_by_one(left)
+            steps = find_manoeuvre(*questions, p.max_distance, turning_radius, lambda: token.cancelled)
             if steps is not None:
                 return steps
         return None

@@ -18,6 +18,7 @@ Deviation from the costmap's answers: a disc has no heading, hence ``angle_toler
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,10 +26,11 @@ import numpy as np
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
 from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery, PoseAnswer
-from mbf_mesh_nav.arrays import BoolArray, IntArray
+from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
+from mbf_mesh_nav.kernels.mesh.touching_discs import blocked_places, touching_discs
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
-from mbf_mesh_nav.mesh.borders import on_surface
+from mbf_mesh_nav.mesh.borders import beyond_border, on_surface
 from mbf_mesh_nav.mesh.locate import SurfaceLocator, SurfacePoint
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
@@ -40,6 +42,8 @@ FORBIDDEN_COST = 1.0
 
 ON_EDGE = 1e-12
 """Share of a corner up to which a place lies on the edge opposite to it."""
+
+PositionsCheck = Callable[[FloatArray], BoolArray]
 
 OUTSIDE = PlaceAnswer(CellState.OUTSIDE, 0.0)
 
@@ -83,6 +87,27 @@ class MeshPlaces:
         around = self._disc(place, 2.0 * self.inscribed_radius + query.safety_dist)
         state = CellState.INSCRIBED if self._blocked(around).any() else CellState.FREE
         return PlaceAnswer(state, float(costs.sum()))
+
+    def fit_check(self, query: PlaceQuery) -> PositionsCheck:
+        """Return a function: whether ``check_pose`` finds the disc to touch nothing (n,) at positions (n, 3) [m]."""
+        snapshot, radius = self.snapshot, self.inscribed_radius + query.safety_dist
+        blocked = snapshot.lethal | ~np.isfinite(snapshot.costs)
+        return lambda positions: self._meet_nothing(positions, touching_discs, blocked, radius)
+
+    def way_check(self, room: float = 0.0) -> PositionsCheck:
+        """Return a function: whether ``check_on_path`` finds that plans may lead over positions (n, 3) [m]."""
+        blocked = ~(self.snapshot.costs < FORBIDDEN_COST) | self.snapshot.lethal
+        return lambda positions: self._meet_nothing(positions, blocked_places, blocked, room)
+
+    def _meet_nothing(
+        self, positions: FloatArray, kernel: Callable[..., BoolArray], blocked: BoolArray, radius: float
+    ) -> BoolArray:
+        mesh, location = self.topology, self.locator.locate(positions, SURFACE_DISTANCE)
+        on_surface = (location.faces >= 0) & ~beyond_border(mesh, positions, location)
+        graph = mesh.vertices, mesh.faces, mesh.neighbour_offsets, mesh.neighbours
+        places = location.points[on_surface], location.faces[on_surface]
+        on_surface[on_surface] = ~kernel(*graph, blocked, *places, float(radius), ON_EDGE)
+        return on_surface
 
     def check_on_path(self, pose: Pose, room: float = 0.0) -> PlaceAnswer:
         """State and cost of the vertex nearest to a robot's centre: LETHAL if no plan would touch it.

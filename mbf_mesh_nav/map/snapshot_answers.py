@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.polyline import places_between
-from mbf_abstract.maps.navigation_map import PlaceCheck
-from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.maps.queries import PlaceCheck, PlaceQuery, PlaneCheck, PoseAnswer, in_plane
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.map.places import FORBIDDEN_COST, MeshPlaces
 from mbf_mesh_nav.map.places import SURFACE_DISTANCE as OF_PLACES
@@ -139,6 +139,16 @@ class SnapshotAnswers(OutlinedMap):
         """State of the ground below the robot's centre as planners look at it: LETHAL where it costs too much."""
         places = self.places()
         return lambda pose: places.check_on_path(pose, query.safety_dist)
+
+    def plane_check(self, query: PlaceQuery, frame: Transform) -> PlaneCheck:
+        """As ``pose_check``, for all poses in one kernel."""
+        fits = self.places().fit_check(query)
+        return lambda poses: fits(in_plane(frame, poses))
+
+    def plane_path_check(self, query: PlaceQuery, frame: Transform) -> PlaneCheck:
+        """As ``path_check``, for all poses in one kernel."""
+        is_way = self.places().way_check(query.safety_dist)
+        return lambda poses: is_way(in_plane(frame, poses))
 
     def find_valid_pose(
         self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbf_abstract.geometry.arithmetic import norm
 from mbf_mesh_nav.arrays import BoolArray, FloatArray
+from mbf_mesh_nav.kernels.mesh.borders import past_borders
 from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
@@ -20,17 +20,9 @@ def beyond_border(topology: MeshTopology, places: FloatArray, location: Location
     The surface point nearest to such a position lies on a border edge, and not below or above it. ``location`` is that
     of the places; those without a face are not beyond a border.
     """
-    on_surface = np.maximum(location.faces, 0)
-    offsets = np.where(location.faces[:, None] >= 0, places - location.points, 0.0)
-    normals = topology.face_normals[on_surface]
-    sideways = offsets - (offsets * normals).sum(axis=1, keepdims=True) * normals
-    # Side i of a face runs from corner i to the next, so it is opposite to the corner after that. In a vertex the face
-    # may be any of those around it.
-    near = np.nan_to_num(location.barycentric, nan=1.0) > ON_EDGE
-    on_border = (~np.roll(near, -2, axis=1) & (topology.face_neighbours[on_surface] < 0)).any(axis=1)
-    in_vertex = near.sum(axis=1) == 1
-    on_border |= in_vertex & (near & topology.border_vertices[topology.faces[on_surface]]).any(axis=1)
-    return np.asarray(on_border & (norm(sideways) > BORDER_SLACK))
+    mesh = topology.faces, topology.face_normals, topology.face_neighbours, topology.border_vertices
+    found = location.faces, location.barycentric, location.points
+    return np.asarray(past_borders(*mesh, np.array(places, dtype=np.float64), *found, BORDER_SLACK, ON_EDGE))
 
 
 def on_surface(

@@ -13,7 +13,8 @@ import numpy as np
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.maps.manoeuvres import LEAST_LEFT, PlanarPose
+from mbf_abstract.maps.manoeuvres import LEAST_LEFT
+from mbf_abstract.maps.queries import PlanarPose
 from mbf_mesh_nav.arrays import BoolArray, FloatArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE

@@ -23,6 +23,7 @@ from mbf_abstract.geometry.arcs import arc_poses, arc_to
 from mbf_abstract.geometry.tangent_plane import ground_distance
 from mbf_abstract.maps.controllers.failures import obstacle_text
 from mbf_abstract.maps.manoeuvres import LEAST_RADIUS, Step, find_manoeuvre
+from mbf_abstract.maps.queries import one_by_one
 from mbf_abstract.maps.recoveries.manoeuvre_recovery import ManoeuvreParameters, ManoeuvreRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import parameter
@@ -145,7 +146,8 @@ class EscapeRecovery(MeshRecovery, ManoeuvreRecovery):
                 return RecoveryResult(RecoveryOutcome.SUCCESS, "reached a safe surface")
             surface = LeavingSurface(mesh_map, begin, np.isfinite(distances), safe & np.isfinite(distances))
             longest = self.parameters.max_distance
-            steps = find_manoeuvre(surface.may_pass, surface.left, longest, radius, lambda: token.cancelled)
+            questions = one_by_one(surface.may_pass), one_by_one(surface.left)
+            steps = find_manoeuvre(*questions, longest, radius, lambda: token.cancelled)
             return self._nowhere("by a manoeuvre") if steps is None else steps
 
         return self.drive_out(request, search)

@@ -12,7 +12,8 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery, ended_by_others
-from mbf_abstract.maps.manoeuvres import PlanarPose, Step
+from mbf_abstract.maps.manoeuvres import Step
+from mbf_abstract.maps.queries import PlanarPose
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult

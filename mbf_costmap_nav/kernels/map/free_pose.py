@@ -1,6 +1,8 @@
-"""The search of the nearest pose at which a footprint fits: candidates in order, headings in order."""
+"""Poses at which a footprint fits: the nearest one, and which of many do."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,7 @@ from mbf_costmap_nav.kernels.costs import (
     FREE_STATE,
     INSCRIBED,
     INSCRIBED_STATE,
+    LETHAL,
     LETHAL_STATE,
     OUTSIDE_STATE,
     UNKNOWN,
@@ -64,3 +67,60 @@ def first_fitting_pose(
             if fallback < 0:
                 fallback, fallback_yaw, fallback_state = c, k, OUTSIDE_STATE if covered < 0 else UNKNOWN_STATE
     return fallback, fallback_yaw, fallback_state, UNKNOWN if fallback_state == UNKNOWN_STATE else 0
+
+
+@kernel
+def fitting_poses(
+    cells: NDArray[np.uint8],
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+    outline: FloatArray,
+    translation: tuple[float, float, float],
+    rotation: tuple[float, float, float, float],
+    poses: FloatArray,
+) -> NDArray[np.bool_]:
+    """Whether nothing that a footprint covers at poses in the plane of a frame is lethal, unknown, or off the grid.
+
+    In the arithmetic of ``Transform.apply_to_pose`` and ``Footprint.at``, so that it says the same as a check of each.
+
+    Parameters
+    ----------
+    cells : (height, width) uint8
+    origin_x, origin_y, resolution : float
+        Of the grid [m].
+    outline : (k, 2) float64
+        Footprint around the base [m], which it covers.
+    translation, rotation : tuple of float
+        Of the frame in that of the grid [m]; x y z w.
+    poses : (n, 3) float64
+        x, y [m] and heading [rad] of the base in the plane of the frame.
+    """
+    height, width = cells.shape
+    ax, ay, az, aw = rotation
+    fits = np.empty(len(poses), dtype=np.bool_)
+    corners = np.empty_like(outline)
+    for i in range(len(poses)):
+        # The place: v + 2 u x (u x v + w v), as ``rotate`` has it.
+        x, y = poses[i, 0], poses[i, 1]
+        cx, cy, cz = aw * x - az * y, az * x + aw * y, ax * y - ay * x
+        x, y = translation[0] + (x + 2.0 * (ay * cz - az * cy)), translation[1] + (y + 2.0 * (az * cx - ax * cz))
+        column, row = (x - origin_x) / resolution, (y - origin_y) / resolution
+        fits[i] = False
+        if not (0.0 <= column < width and 0.0 <= row < height):
+            continue
+        below = cells[int(row), int(column)]  # the base, which the footprint covers
+        if below == LETHAL or below == UNKNOWN:
+            continue
+        # The heading: that of the product of both rotations.
+        sine, cosine = math.sin(poses[i, 2] / 2.0), math.cos(poses[i, 2] / 2.0)
+        qx, qy = ax * cosine + ay * sine, ay * cosine - ax * sine
+        qz, qw = aw * sine + az * cosine, aw * cosine - az * sine
+        yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+        cosine, sine = math.cos(yaw), math.sin(yaw)
+        for k in range(len(outline)):
+            corners[k, 0] = (cosine * outline[k, 0] + -sine * outline[k, 1] + x - origin_x) / resolution
+            corners[k, 1] = (sine * outline[k, 0] + cosine * outline[k, 1] + y - origin_y) / resolution
+        covered, lethal, _, unknown, _, _ = polygon_costs(cells, corners)
+        fits[i] = covered >= 0 and lethal == 0 and unknown == 0
+    return fits

@@ -1,4 +1,4 @@
-"""Where a round robot on a path touches something."""
+"""Where a round robot on a path, or at many places, touches something."""
 
 from __future__ import annotations
 
@@ -42,10 +42,7 @@ def touching_discs(
     for i in range(len(faces)):
         face = mesh_faces[faces[i]]
         _set_shares(vertices, face, centres[i], shares)
-        nearest = Count(0)
-        for corner in range(1, 3):
-            if shares[corner] > shares[nearest]:
-                nearest = Count(corner)
+        nearest = _largest(shares)
         if not _any_blocked(vertices, offsets, neighbours, blocked, Count(face[nearest]), centres[i], radius):
             continue
         for corner in range(3):
@@ -58,6 +55,50 @@ def touching_discs(
                 touching[i] = True
                 break
     return touching
+
+
+@kernel
+def blocked_places(
+    vertices: FloatArray,
+    mesh_faces: IntArray,
+    offsets: IntArray,
+    neighbours: IntArray,
+    blocked: BoolArray,
+    centres: FloatArray,
+    faces: IntArray,
+    radius: float,
+    least_share: float,
+) -> BoolArray:
+    """Whether a path through places meets blocked ground, as ``MeshPlaces`` says of one place on it.
+
+    The nearest corner of the face counts, with a ``radius`` [m] all corners and all vertices of the disc. Parameters as
+    of ``touching_discs``.
+    """
+    meets = np.empty(len(faces), dtype=np.bool_)
+    shares = np.empty(3)
+    for i in range(len(faces)):
+        face = mesh_faces[faces[i]]
+        _set_shares(vertices, face, centres[i], shares)
+        nearest = _largest(shares)
+        meets[i] = blocked[face[nearest]]
+        if radius == 0.0:
+            continue
+        for corner in range(3):
+            meets[i] |= shares[corner] > least_share and blocked[face[corner]]
+        if not meets[i]:
+            start = Count(face[nearest])
+            meets[i] = _any_blocked(vertices, offsets, neighbours, blocked, start, centres[i], radius)
+    return meets
+
+
+@inner_kernel
+def _largest(shares: FloatArray) -> int:
+    """Return the corner with the largest share, the first of equal ones."""
+    largest: int = Count(0)
+    for corner in range(1, 3):
+        if shares[corner] > shares[largest]:
+            largest = Count(corner)
+    return largest
 
 
 @inner_array_kernel

@@ -8,8 +8,7 @@ from abc import abstractmethod
 import numpy as np
 
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.maps.navigation_map import PlaceCheck
-from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.maps.queries import PlaceAnswer, PlaceCheck, PlaceQuery, PoseAnswer
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.map.ground import ground_heights
 from mbf_mesh_nav.map.mesh_map import MeshMap
