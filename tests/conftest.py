@@ -19,6 +19,8 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeat"))
 
 LONGEST = ("unit/actions/test_interleavings.py", "determinism/", "system/ros2/test_actions_and_services.py")
 """Files of minutes. A worker takes a file whole, so these come first: the last ones to begin are short."""
+WAITING = ("system/ros2/", "system/rosbridge/", "system/npm/", "unit/viewer/")
+"""Files that mostly wait, for other processes and for pages. All at once they would leave the processors idle."""
 
 
 class UncountedCompiler(event.Listener):
@@ -89,8 +91,16 @@ def pytest_collection() -> Iterator[None]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the longest files first; all else stays in its order."""
-    items.sort(key=lambda item: not any(f"tests/{part}" in item.path.as_posix() for part in LONGEST))
+    """Put the longest files first, and spread those that wait evenly among the others."""
+
+    def is_of(parts: tuple[str, ...], file: Path) -> bool:
+        return any(f"tests/{part}" in file.as_posix() for part in parts)
+
+    files, place = dict.fromkeys(item.path for item in items), dict[Path, float]()
+    for waits in (True, False):
+        group = [file for file in files if is_of(WAITING, file) == waits]
+        place |= {file: (number + 0.5) / len(group) for number, file in enumerate(group)}
+    items.sort(key=lambda item: (not is_of(LONGEST, item.path), place[item.path]))
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
