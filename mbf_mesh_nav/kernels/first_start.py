@@ -16,6 +16,7 @@ from mbf_mesh_nav.kernels.layers.fading_costs import set_fading_costs
 from mbf_mesh_nav.kernels.layers.footprint_settling import settle_footprints
 from mbf_mesh_nav.kernels.layers.inflation import repair_distances
 from mbf_mesh_nav.kernels.layers.neighbourhood_layers import height_differences, mean_edge_angles, neighbourhood_means
+from mbf_mesh_nav.kernels.mesh.borders import past_borders
 from mbf_mesh_nav.kernels.mesh.bounding_boxes import closest_face, closest_faces
 from mbf_mesh_nav.kernels.mesh.corners import build_corner_ends, write_corner_weights
 from mbf_mesh_nav.kernels.mesh.defects import face_shapes, fans_at_vertices, superfluous_faces
@@ -73,6 +74,7 @@ def kernels() -> list[tuple[Any, tuple[Any, ...]]]:
         (points_on_branch, (numbers, 0, points, points, True)),
         (poses_along, (rows, rows, 0.0)),
         (closest_faces, (points, faces, rows, numbers, rows, _example(np.int64), 0.0)),
+        (past_borders, (faces, points, faces, flags, rows, numbers, rows, rows, 0.0, 0.0)),
         (way_cost, (points, faces, costs, 0.0, rows, numbers)),
         (link_faces, (free, numbers)),
         (straighten, (free, numbers, point, point, True)),
