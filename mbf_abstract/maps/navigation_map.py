@@ -123,12 +123,8 @@ class NavigationMap(ABC):
         return self.pose_check(query)
 
     def plane_check(self, query: PlaceQuery, frame: Transform) -> PlaneCheck:
-        """Whether ``pose_check`` finds the robot to fit, at many poses in the plane of a frame."""
-        return each_pose(self.pose_check(query), frame)
-
-    def plane_path_check(self, query: PlaceQuery, frame: Transform) -> PlaneCheck:
-        """As ``plane_check``, by what ``path_check`` says."""
-        return each_pose(self.path_check(query), frame)
+        """A function: the ``Fit`` at many poses in the plane of a frame, by ``pose_check`` and ``path_check``."""
+        return each_pose(self.pose_check(query), self.path_check(query), frame)
 
     @abstractmethod
     def find_valid_pose(

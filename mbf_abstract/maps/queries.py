@@ -13,16 +13,17 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
-from mbf_abstract.geometry.transform import Transform, rotate
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.maps.kernels.steps import positions_in_frame
 
 PlanarPose = tuple[float, float, float]
 """x, y [m] and heading [rad] in a plane."""
 
-PlaneCheck = Callable[[FloatArray], NDArray[np.bool_]]
-"""Whether the robot fits (n,) at poses (n, 3: x, y [m], heading [rad]) in the plane of a frame."""
+PlaneCheck = Callable[[FloatArray], NDArray[np.int8]]
+"""The ``Fit`` (n,) of the robot at poses (n, 3: x, y [m], heading [rad]) in the plane of a frame."""
 
 
 class CellState(IntEnum):
@@ -128,19 +129,32 @@ def on_map(frame: Transform, pose: PlanarPose) -> Pose:
     return frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id=frame.child))
 
 
+class Fit(IntEnum):
+    """Whether the robot may stand at a pose, from bad to good."""
+
+    TOUCHES = 0
+    OFF_PATHS = 1
+    """It touches nothing, on ground that no plan leads over."""
+    FREE = 2
+
+
 def in_plane(frame: Transform, poses: FloatArray) -> FloatArray:
     """Positions (n, 3) [m], in the parent of ``frame``, of poses (n, 3) in its plane; each as of ``on_map``."""
-    seen: Any = (poses[:, 0], poses[:, 1], 0.0)  # of all at once, in the arithmetic of one
-    positions = np.empty((len(poses), 3))
-    positions[:, 0], positions[:, 1], positions[:, 2] = rotate(frame.rotation, seen)
-    return positions + frame.translation
+    return np.asarray(positions_in_frame(poses, frame.translation, frame.rotation))
 
 
-def each_pose(check: PlaceCheck, frame: Transform) -> PlaneCheck:
-    """Return the check of poses in the plane of ``frame`` that asks one after the other: FREE or INSCRIBED fits."""
-    return one_by_one(lambda pose: check(on_map(frame, pose)).state <= CellState.INSCRIBED)
+def each_pose(touch: PlaceCheck, on_path: PlaceCheck, frame: Transform) -> PlaneCheck:
+    """Return the check of poses in the plane of ``frame`` that asks the checks of one pose about each."""
+
+    def fit(pose: PlanarPose) -> Fit:
+        there = on_map(frame, pose)
+        if touch(there).state > CellState.INSCRIBED:
+            return Fit.TOUCHES
+        return Fit.FREE if on_path(there).state <= CellState.INSCRIBED else Fit.OFF_PATHS
+
+    return one_by_one(fit, np.int8)
 
 
-def one_by_one(function: Callable[[PlanarPose], Any]) -> Callable[[FloatArray], NDArray[Any]]:
-    """Return the function of many poses (n, 3) that calls ``function`` for each."""
-    return lambda poses: np.array([function((x, y, yaw)) for x, y, yaw in poses.tolist()])
+def one_by_one(function: Callable[[PlanarPose], Any], kind: DTypeLike) -> Callable[[FloatArray], NDArray[Any]]:
+    """Return the function of many poses (n, 3) that calls ``function`` for each; its values are of a ``kind``."""
+    return lambda poses: np.array([function((x, y, yaw)) for x, y, yaw in poses.tolist()], dtype=kind)

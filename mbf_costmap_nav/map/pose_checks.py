@@ -70,13 +70,12 @@ def pose_check(costmap: Costmap, footprint: Footprint, query: PlaceQuery = AS_CO
 
 
 def plane_check(costmap: Costmap, footprint: Footprint, frame: Transform, safety_dist: float) -> PlaneCheck:
-    """As ``pose_check``: whether the footprint, grown by a distance [m], fits at poses in the plane of ``frame``."""
+    """As ``pose_check``: how the footprint, grown by a distance [m], fits at poses in the plane of ``frame``."""
     vertices = footprint.offset(safety_dist).vertices
     outline = np.array(vertices) if len(vertices) >= 3 else np.zeros((1, 2))
     grid = costmap.origin_x, costmap.origin_y, costmap.resolution
-    return lambda poses: np.asarray(
-        fitting_poses(costmap.cells, *grid, outline, frame.translation, frame.rotation, poses)
-    )
+    placed = *grid, outline, frame.translation, frame.rotation
+    return lambda poses: np.asarray(fitting_poses(costmap.cells, *placed, poses))
 
 
 def find_valid_pose(

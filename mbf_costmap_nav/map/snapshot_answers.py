@@ -86,7 +86,7 @@ class SnapshotAnswers(LayeredMap):
         return pose_checks.pose_check(self.snapshot(), self._outline(query), query)
 
     def plane_check(self, query: PlaceQuery, frame: Transform) -> PlaneCheck:
-        """As ``pose_check``, for all poses in one kernel."""
+        """As ``pose_check`` says, which is all that paths are checked by; all poses in one kernel."""
         return pose_checks.plane_check(self.snapshot(), self._outline(query), frame, query.safety_dist)
 
     def find_valid_pose(

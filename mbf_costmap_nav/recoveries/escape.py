@@ -16,6 +16,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import numpy as np
+
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.manoeuvres import Step, find_manoeuvre, radius_beyond
@@ -149,7 +151,7 @@ class EscapeRecovery(CostmapRecovery, ManoeuvreRecovery):
             def may_pass(pose: PlanarPose, room: float = room) -> bool:
                 return all(one.may_pass(pose, room) for one in maps)
 
-            questions = one_by_one(may_pass), one_by_one(left)
+            questions = one_by_one(may_pass, np.bool_), one_by_one(left, np.float64)
             steps = find_manoeuvre(*questions, p.max_distance, turning_radius, lambda: token.cancelled)
             if steps is not None:
                 return steps

@@ -22,10 +22,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
-from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.maps.queries import CellState, Fit, PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 from mbf_mesh_nav.kernels.mesh.touching_discs import blocked_places, touching_discs
@@ -42,8 +43,6 @@ FORBIDDEN_COST = 1.0
 
 ON_EDGE = 1e-12
 """Share of a corner up to which a place lies on the edge opposite to it."""
-
-PositionsCheck = Callable[[FloatArray], BoolArray]
 
 OUTSIDE = PlaceAnswer(CellState.OUTSIDE, 0.0)
 
@@ -88,26 +87,25 @@ class MeshPlaces:
         state = CellState.INSCRIBED if self._blocked(around).any() else CellState.FREE
         return PlaceAnswer(state, float(costs.sum()))
 
-    def fit_check(self, query: PlaceQuery) -> PositionsCheck:
-        """Return a function: whether ``check_pose`` finds the disc to touch nothing (n,) at positions (n, 3) [m]."""
-        snapshot, radius = self.snapshot, self.inscribed_radius + query.safety_dist
-        blocked = snapshot.lethal | ~np.isfinite(snapshot.costs)
-        return lambda positions: self._meet_nothing(positions, touching_discs, blocked, radius)
-
-    def way_check(self, room: float = 0.0) -> PositionsCheck:
-        """Return a function: whether ``check_on_path`` finds that plans may lead over positions (n, 3) [m]."""
-        blocked = ~(self.snapshot.costs < FORBIDDEN_COST) | self.snapshot.lethal
-        return lambda positions: self._meet_nothing(positions, blocked_places, blocked, room)
-
-    def _meet_nothing(
-        self, positions: FloatArray, kernel: Callable[..., BoolArray], blocked: BoolArray, radius: float
-    ) -> BoolArray:
-        mesh, location = self.topology, self.locator.locate(positions, SURFACE_DISTANCE)
-        on_surface = (location.faces >= 0) & ~beyond_border(mesh, positions, location)
+    def fit_check(self, query: PlaceQuery) -> Callable[[FloatArray], NDArray[np.int8]]:
+        """Return a function: the ``Fit`` (n,) at positions (n, 3) [m], by ``check_pose`` and ``check_on_path``."""
+        mesh, snapshot = self.topology, self.snapshot
         graph = mesh.vertices, mesh.faces, mesh.neighbour_offsets, mesh.neighbours
-        places = location.points[on_surface], location.faces[on_surface]
-        on_surface[on_surface] = ~kernel(*graph, blocked, *places, float(radius), ON_EDGE)
-        return on_surface
+        radius, room = float(self.inscribed_radius + query.safety_dist), float(query.safety_dist)
+        touched = snapshot.lethal | ~np.isfinite(snapshot.costs)
+        forbidden = snapshot.lethal | ~(snapshot.costs < FORBIDDEN_COST)
+
+        def fit(positions: FloatArray) -> NDArray[np.int8]:
+            location = self.locator.locate(positions, SURFACE_DISTANCE)
+            on_surface = (location.faces >= 0) & ~beyond_border(mesh, positions, location)
+            places = location.points[on_surface], location.faces[on_surface]
+            free = ~touching_discs(*graph, touched, *places, radius, ON_EDGE)
+            on_paths = ~blocked_places(*graph, forbidden, *places, room, ON_EDGE)
+            found = np.full(len(positions), Fit.TOUCHES, dtype=np.int8)
+            found[on_surface] = np.where(free, np.where(on_paths, Fit.FREE, Fit.OFF_PATHS), Fit.TOUCHES)
+            return found
+
+        return fit
 
     def check_on_path(self, pose: Pose, room: float = 0.0) -> PlaceAnswer:
         """State and cost of the vertex nearest to a robot's centre: LETHAL if no plan would touch it.

@@ -141,14 +141,9 @@ class SnapshotAnswers(OutlinedMap):
         return lambda pose: places.check_on_path(pose, query.safety_dist)
 
     def plane_check(self, query: PlaceQuery, frame: Transform) -> PlaneCheck:
-        """As ``pose_check``, for all poses in one kernel."""
-        fits = self.places().fit_check(query)
-        return lambda poses: fits(in_plane(frame, poses))
-
-    def plane_path_check(self, query: PlaceQuery, frame: Transform) -> PlaneCheck:
-        """As ``path_check``, for all poses in one kernel."""
-        is_way = self.places().way_check(query.safety_dist)
-        return lambda poses: is_way(in_plane(frame, poses))
+        """As ``pose_check`` and ``path_check`` say, for all poses in a few kernels."""
+        fit = self.places().fit_check(query)
+        return lambda poses: fit(in_plane(frame, poses))
 
     def find_valid_pose(
         self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery

@@ -146,7 +146,7 @@ class EscapeRecovery(MeshRecovery, ManoeuvreRecovery):
                 return RecoveryResult(RecoveryOutcome.SUCCESS, "reached a safe surface")
             surface = LeavingSurface(mesh_map, begin, np.isfinite(distances), safe & np.isfinite(distances))
             longest = self.parameters.max_distance
-            questions = one_by_one(surface.may_pass), one_by_one(surface.left)
+            questions = one_by_one(surface.may_pass, np.bool_), one_by_one(surface.left, np.float64)
             steps = find_manoeuvre(*questions, longest, radius, lambda: token.cancelled)
             return self._nowhere("by a manoeuvre") if steps is None else steps
 

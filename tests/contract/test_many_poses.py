@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.maps.queries import PADDED, CellState, PlaceQuery, on_map
+from mbf_abstract.maps.queries import PADDED, CellState, Fit, PlaceQuery, each_pose, on_map
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from tests.contract.conftest import costmap_of, is_wall, mesh_of
@@ -47,26 +47,26 @@ def navigation_map(request):
     return MAPS[request.param]()
 
 
-@pytest.mark.parametrize("question", ["pose", "path"])
 @pytest.mark.parametrize("query", [PADDED, PlaceQuery(safety_dist=0.07)], ids=["padded", "with room"])
-def test_of_many_poses_in_a_plane_it_says_what_it_says_of_each(navigation_map, query, question):
+def test_of_many_poses_in_a_plane_it_says_what_it_says_of_each(navigation_map, query):
     rng, answers = np.random.default_rng(1), []
-    one, many = {
-        "pose": (navigation_map.pose_check, navigation_map.plane_check),
-        "path": (navigation_map.path_check, navigation_map.plane_path_check),
-    }[question]
+    touch, on_path = navigation_map.pose_check(query), navigation_map.path_check(query)
     for _ in range(10):
         frame = drawn_frame(rng)
         poses = rng.uniform((-1.5, -1.5, -7.0), (1.5, 1.5, 7.0), (POSES, 3))
-        fits = many(query, frame)(poses)
-        check = one(query)
-        each = [check(on_map(frame, tuple(pose))).state <= CellState.INSCRIBED for pose in poses.tolist()]
-        assert fits.tolist() == each
+        each = each_pose(touch, on_path, frame)(poses).tolist()
+        assert navigation_map.plane_check(query, frame)(poses).tolist() == each
         answers += each
-    assert 0.05 < np.mean(answers) < 0.95, "both answers come"
+    assert 0.05 < np.mean(np.array(answers) == Fit.FREE) < 0.95, "both answers come"
+
+
+def test_each_answer_is_that_of_the_checks_of_one_pose(navigation_map):
+    frame, check = Transform((1.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0), "map", "begin"), navigation_map.pose_check(PADDED)
+    poses = [(0.1 * step, 0.2, 0.3) for step in range(-20, 60)]
+    fits = [fit != Fit.TOUCHES for fit in navigation_map.plane_check(PADDED, frame)(np.array(poses)).tolist()]
+    assert fits == [check(on_map(frame, pose)).state <= CellState.INSCRIBED for pose in poses]
 
 
 def test_no_pose_gives_no_answer(navigation_map):
     frame = Transform((1.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0), "map", "begin")
-    for check in (navigation_map.plane_check, navigation_map.plane_path_check):
-        assert len(check(PADDED, frame)(np.zeros((0, 3)))) == 0
+    assert len(navigation_map.plane_check(PADDED, frame)(np.zeros((0, 3)))) == 0

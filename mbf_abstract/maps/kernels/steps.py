@@ -1,4 +1,4 @@
-"""Steps of a manoeuvre: where they lead from a pose, and how far their ends are from points."""
+"""Steps of a manoeuvre: where they lead from a pose, where that is on the map, how far their ends are from points."""
 
 from __future__ import annotations
 
@@ -24,6 +24,25 @@ def steps_from(x: float, y: float, yaw: float, steps: FloatArray) -> FloatArray:
             moved[i, j, 1] = y + s * ahead + c * left
             moved[i, j, 2] = yaw + steps[i, j, 2]
     return moved
+
+
+@brief_kernel
+def positions_in_frame(
+    poses: FloatArray, translation: tuple[float, float, float], rotation: tuple[float, float, float, float]
+) -> FloatArray:
+    """Positions (n, 3) [m] of poses (n, 3) in the plane of a frame, in its parent, as of ``Transform.apply_to_pose``.
+
+    ``v + 2 u x (u x v + w v)`` with the rotation (u, w), as ``rotate`` has it.
+    """
+    ax, ay, az, aw = rotation
+    positions = np.empty_like(poses)
+    for i in range(len(poses)):
+        x, y = poses[i, 0], poses[i, 1]
+        cx, cy, cz = aw * x - az * y, az * x + aw * y, ax * y - ay * x
+        positions[i, 0] = translation[0] + (x + 2.0 * (ay * cz - az * cy))
+        positions[i, 1] = translation[1] + (y + 2.0 * (az * cx - ax * cz))
+        positions[i, 2] = translation[2] + 2.0 * (ax * cy - ay * cx)
+    return positions
 
 
 @brief_kernel

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 
 from mbf_abstract.compiling.decorators import kernel
 from mbf_costmap_nav.kernels.costs import (
+    FREE_FIT,
     FREE_STATE,
     INSCRIBED,
     INSCRIBED_STATE,
     LETHAL,
     LETHAL_STATE,
     OUTSIDE_STATE,
+    TOUCHES_FIT,
     UNKNOWN,
     UNKNOWN_STATE,
 )
@@ -79,8 +81,8 @@ def fitting_poses(
     translation: tuple[float, float, float],
     rotation: tuple[float, float, float, float],
     poses: FloatArray,
-) -> NDArray[np.bool_]:
-    """Whether nothing that a footprint covers at poses in the plane of a frame is lethal, unknown, or off the grid.
+) -> NDArray[np.int8]:
+    """The fit of a footprint at poses in the plane of a frame; what is lethal, unknown or off the grid is touched.
 
     In the arithmetic of ``Transform.apply_to_pose`` and ``Footprint.at``, so that it says the same as a check of each.
 
@@ -98,7 +100,7 @@ def fitting_poses(
     """
     height, width = cells.shape
     ax, ay, az, aw = rotation
-    fits = np.empty(len(poses), dtype=np.bool_)
+    fits = np.empty(len(poses), dtype=np.int8)
     corners = np.empty_like(outline)
     for i in range(len(poses)):
         # The place: v + 2 u x (u x v + w v), as ``rotate`` has it.
@@ -106,7 +108,7 @@ def fitting_poses(
         cx, cy, cz = aw * x - az * y, az * x + aw * y, ax * y - ay * x
         x, y = translation[0] + (x + 2.0 * (ay * cz - az * cy)), translation[1] + (y + 2.0 * (az * cx - ax * cz))
         column, row = (x - origin_x) / resolution, (y - origin_y) / resolution
-        fits[i] = False
+        fits[i] = TOUCHES_FIT
         if not (0.0 <= column < width and 0.0 <= row < height):
             continue
         below = cells[int(row), int(column)]  # the base, which the footprint covers
@@ -122,5 +124,6 @@ def fitting_poses(
             corners[k, 0] = (cosine * outline[k, 0] + -sine * outline[k, 1] + x - origin_x) / resolution
             corners[k, 1] = (sine * outline[k, 0] + cosine * outline[k, 1] + y - origin_y) / resolution
         covered, lethal, _, unknown, _, _ = polygon_costs(cells, corners)
-        fits[i] = covered >= 0 and lethal == 0 and unknown == 0
+        if covered >= 0 and lethal == 0 and unknown == 0:
+            fits[i] = FREE_FIT
     return fits

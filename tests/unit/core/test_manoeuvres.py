@@ -39,7 +39,7 @@ def off_the_axis(distance):
 
 
 def find(is_free, left, most, turning_radius=0.0, **options):
-    return find_manoeuvre(one_by_one(is_free), one_by_one(left), most, turning_radius, **options)
+    return find_manoeuvre(one_by_one(is_free, bool), one_by_one(left, float), most, turning_radius, **options)
 
 
 def begun_at(kind, begin):
