@@ -87,19 +87,21 @@ class RobotInputs:
     context: Callable[[], MessageContext]
     hear: Callable[[str], None] = lambda topic: None
 
-    def of_robot(self, robot: RosRobot, transforms: TransformBuffer, uses_odometry: bool) -> Iterator[Input]:
+    def of_robot(
+        self, robot: RosRobot, transforms: TransformBuffer, uses_odometry: bool, odom_topic: str = ODOM
+    ) -> Iterator[Input]:
         """Yield odometry, where it is used, and transforms."""
 
         def take_odometry(message: Message) -> None:
             robot.take_odometry(odometry_of(message, self.context(), self.now()))
-            self.hear(ODOM)
+            self.hear(odom_topic)
 
         def take_transforms(message: Message, static: bool = False) -> None:
             for transform in transforms_of(message, self.context(), self.now(), static):
                 transforms.set(transform)
 
         if uses_odometry:
-            yield Input(ODOM, "nav_msgs/Odometry", Quality.SENSOR_DATA, take_odometry)
+            yield Input(odom_topic, "nav_msgs/Odometry", Quality.SENSOR_DATA, take_odometry)
         yield Input(TF, "tf2_msgs/TFMessage", Quality.MANY, take_transforms)
         yield Input(TF_STATIC, "tf2_msgs/TFMessage", Quality.LATCHED, partial(take_transforms, static=True))
 

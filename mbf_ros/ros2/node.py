@@ -9,7 +9,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +80,7 @@ class NavigationNode(RobotNavigation):
         self._options = options
         self.failure = ""
         self._failed = threading.Event()
+        self._odom_topic = ODOM
         self._arrivals = Arrivals(self._real_time.now)
         self._node: Any = rclpy.create_node(NODE)
         self._closing.callback(self._node.destroy_node)
@@ -99,7 +99,8 @@ class NavigationNode(RobotNavigation):
         commands = CommandTopic(self._node, stamped, robot_frame, self._clock, self._context)
         self._make_navigator(server_class, config, commands, self._options.time_to_send)
         server = self.session.navigator.server
-        self._open_topics(config, NodeParameters(self._node, server).odom_topic)
+        self._odom_topic = NodeParameters(self._node, server).odom_topic
+        self._open_topics(config)
         serving = Serving(self.session.navigator.send, self._context, self._refusal, self._fail)
         self._actions = [ServedAction(self._node, f"~/{name}", *action, serving) for name, action in ACTIONS.items()]
         if not self._options.keep_goals:
@@ -147,7 +148,7 @@ class NavigationNode(RobotNavigation):
             self._node.get_logger().info(f"use_sim_time: waiting for {CLOCK}", throttle_duration_sec=5.0)
         return clocks[0]
 
-    def _open_topics(self, config: Config, odom_topic: str) -> None:
+    def _open_topics(self, config: Config) -> None:
         navigator = self.session.navigator
         outputs = Outputs(
             self._node, self.session, self._real_time, self._context, self._robot.problems, self._options.map_period
@@ -158,8 +159,7 @@ class NavigationNode(RobotNavigation):
         self._forget_arrivals()
         sensors = used_sensors(self._options.sensors, navigator.server.listens_to, self._warn)
         listening = Inputs(self._node)
-        of_robot = inputs.of_robot(self._robot, self._transforms, uses_odometry)
-        listening.listen(replace(one, topic=odom_topic) if one.topic == ODOM else one for one in of_robot)
+        listening.listen(inputs.of_robot(self._robot, self._transforms, uses_odometry, self._odom_topic))
         listening.listen(inputs.of_sensors(navigator.server.take_scan, sensors))
         listening.listen(inputs.of_maps(navigator.server))
         listening.listen(inputs.of_users(navigator.send, self._refusal))
@@ -173,7 +173,7 @@ class NavigationNode(RobotNavigation):
 
     def _forget_arrivals(self) -> None:
         if self.session.navigator.server.config.parameters.use_odometry:
-            self._arrivals.expect(ODOM)
+            self._arrivals.expect(self._odom_topic)
 
     def _abort_goals(self, text: str) -> None:
         for action in self._actions:

@@ -26,6 +26,18 @@ def test_transforms_always_come_and_odometry_where_it_is_used(uses_odometry):
     assert (found[TF].quality, found[TF_STATIC].quality) == (Quality.MANY, Quality.LATCHED)
 
 
+def test_odometry_on_a_topic_of_another_name_is_heard_under_that_name():
+    class Robot:
+        def take_odometry(self, odometry):
+            self.odometry = odometry
+
+    heard, robot = [], Robot()
+    odometry, *_ = inputs(heard.append).of_robot(robot, TransformBuffer(), True, "wheels/odom")
+    body = {"header": {"frame_id": "odom"}, "twist": {"twist": {"linear": {"x": 0.2}}}}
+    odometry.take(completed(odometry.type, body))
+    assert (odometry.topic, heard, robot.odometry.velocity.vx) == ("wheels/odom", ["wheels/odom"], 0.2)
+
+
 def test_a_static_transform_holds_at_all_times_and_another_one_from_its_arrival_on():
     transforms = TransformBuffer()
     tf, static = inputs().of_robot(None, transforms, False)
