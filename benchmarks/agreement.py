@@ -6,6 +6,7 @@ a robot does not agree that stands, goes about until its time is over, or is led
 more. A contact of the outline without padding ends a drive. Rooms of 6 m x 6 m with boxes and walls with gaps; on the
 costmap a robot of 1.0 m x 0.5 m, on the mesh a disc of 0.25 m. With ``--open`` no walls stand around: the map ends in
 free ground; that of a mesh always does, on two sides.
+``--map long_mesh``: the robot of the costmap on the mesh, with ``check_footprint`` (decision 0137).
 ``--map car``: a car of 1.0 m x 0.5 m with a turning circle of 0.7 m in rooms of 9 m x 9 m, and what can drive it.
 
     python benchmarks/agreement.py [--quick] [--json] [--seeds 0:40] [--map costmap] [--planners a,b] [--controllers c]
@@ -158,11 +159,12 @@ def pairs(backend: str) -> list[tuple[str, str]]:
     """All planners with all controllers, but for those controllers that follow one planner only, and for cars."""
     if backend == "car":
         return [("hybrid_astar", controller) for controller in ("mppi", "regulated_pure_pursuit")]
+    of = WORLDS[backend].backend
     return [
         (planner, controller)
-        for planner in installed(backend, PluginKind.PLANNER)
-        for controller in installed(backend, PluginKind.CONTROLLER)
-        if NEEDS_PLANNER.get(f"{backend}.{controller}", planner) == planner
+        for planner in installed(of, PluginKind.PLANNER)
+        for controller in installed(of, PluginKind.CONTROLLER)
+        if NEEDS_PLANNER.get(f"{of}.{controller}", planner) == planner
     ]
 
 

@@ -13,6 +13,7 @@ from agreement_rooms import SIDE, Box, random_boxes
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.drive.command_delay import CommandDelay
 from mbf_abstract.geometry import FloatArray, Pose, Twist, quaternions_from_axes
+from mbf_abstract.geometry.arithmetic import plane_rotation, rotated_back
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.plugins import PluginKind
@@ -280,4 +281,26 @@ class MeshWorld(World):
         return self.map.pose_check(PADDED)(pose).state < CellState.LETHAL
 
 
-WORLDS = {"costmap": CostmapWorld, "mesh": MeshWorld, "car": CarWorld}
+class LongMeshWorld(MeshWorld):
+    """The robot of the costmaps on a mesh, where its outline has to fit besides the disc."""
+
+    robot = SimulatedRobot(RECTANGLE.outline, radius=0.25)
+
+    def build(self, boxes: list[Box]) -> None:
+        """Make the map of a floor with boxes."""
+        super().build(boxes)
+        self.map.footprint, self.map.check_footprint = self.robot.outline, True
+
+    def touches(self, poses: FloatArray) -> bool:
+        """As for all: a lethal vertex is inside the outline by half the longest edge."""
+        lethal = self.map.topology.vertices[self.walls.lethal, :2]
+        slack = 0.5 * float(self.map.neighbour_lengths.max())
+        half_length, half_width = np.max(self.robot.outline, axis=0) - slack
+        for x, y, yaw in poses.tolist():
+            ahead, left = rotated_back(plane_rotation(yaw), lethal - (x, y)).T
+            if ((np.abs(ahead) < half_length) & (np.abs(left) < half_width)).any():
+                return True
+        return False
+
+
+WORLDS = {"costmap": CostmapWorld, "mesh": MeshWorld, "car": CarWorld, "long_mesh": LongMeshWorld}

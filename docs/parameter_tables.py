@@ -50,7 +50,8 @@ While the server runs, its methods change values. A call changes all of its valu
 - `server.set_parameters(...)` and `set_plugin_parameters(kind, name, ...)`;
 - `set_map_parameters("local_costmap", max_age=1.0)`;
 - `set_layer_parameters("global_costmap.inflation", inflation_radius=0.8)`;
-- `set_footprint(...)` with corners, or a radius; a mesh takes a radius, and those of its layers change by as much.
+- `set_footprint(...)` with corners, or a radius; a mesh takes a radius, and those of its layers change by as much;
+  its `check_footprint` is off then.
 
 A map shows a change after its next update.
 """

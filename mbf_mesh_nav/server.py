@@ -97,7 +97,7 @@ class MeshNavigationServer(MapServer):
 
     def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
         """The radius of the disc that stands for the robot; the radii of layers change by as much."""
-        return changes_of_radius(footprint)
+        return {**changes_of_radius(footprint), "check_footprint": False}
 
     def swap_mesh(self, mesh_file: Path | str) -> None:
         """Drive on another mesh from now on, e.g. after the lift; its layers are those of the configuration.

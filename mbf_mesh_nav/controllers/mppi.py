@@ -206,7 +206,8 @@ class MPPIController(KeepingFollower):
         has_far_to_go = ground_distance(pose, self._approach.goal) > _STANDSTILL + self.parameters.goal_distance
         self._idle_cycles = self._idle_cycles + 1 if stands and has_far_to_go else 0
         stuck = stands and (collided.mean() > 0.5 or self._idle_cycles > _IDLE_CYCLES)
-        return None if stuck or bool(collided.all()) else blended
+        touches = self.outline_on(pose, Twist.planar(float(blended[0, 0]), wz=float(blended[0, 1])))
+        return None if stuck or touches or bool(collided.all()) else blended
 
     def _stops_free(self, control: FloatArray, *there: Any) -> bool:
         """Whether the robot touches nothing until it stands if it is stopped after a step with a control (2,)."""

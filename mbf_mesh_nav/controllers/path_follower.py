@@ -111,7 +111,10 @@ class PathFollower(LeavesContacts, SteeringFollower):
         if not is_turning and (out := self._drive_out(pose)) is not None:
             return self._command(out.vx, out.wz)
         if is_turning:
-            return self._command(0.0, self._turn(heading_error(pose, approach.goal)).wz)
+            off = heading_error(pose, approach.goal)
+            if obstacle := self.outline_on(pose, Twist.planar(wz=off), 1.0):
+                return blocked_path(self.mesh_map, pose, obstacle)
+            return self._command(0.0, self._turn(off).wz)
         if obstacle := self._obstacle_on_path(surface.point):
             return blocked_path(self.mesh_map, pose, obstacle)
         slope = math.acos(clamp(float(self.mesh_map.face_normals[surface.face, 2]), 1.0))
@@ -155,7 +158,11 @@ class PathFollower(LeavesContacts, SteeringFollower):
             turns = turns or p.turns_first(bearing, self._measured, p.max_vel_theta)
             wanted = self._turn(bearing) if turns else self._arc(pose, target, curvature, fastest, share)
             command, anyway = self._reachable(wanted), p.acc_lim_x == math.inf and (turns or share == SHARES[-1])
+            anyway = anyway and not self.mesh_map.check_footprint
             obstacle = self._obstacle_to(pose, target, bearing, 0.0 if turns else curvature, command)
+            ahead = share * p.look_ahead_dist
+            arc = Twist.planar(wz=bearing) if turns else Twist.planar(ahead, wz=ahead * curvature)
+            obstacle = obstacle or self.outline_on(pose, arc, 1.0)
             if anyway or not obstacle:
                 return ControlResult(ExePathOutcome.SUCCESS, "", command)
         return self.closely(request, fastest, is_stuck=True) or blocked_path(self.mesh_map, pose, obstacle)

@@ -100,7 +100,10 @@ class VectorFieldController(SteeringFollower):
         self._face = spot.face
         self._pass_via(spot.point)
         if self._on_last_leg and approach.is_only_turning(pose, self._tracker):
-            return self._command(0.0, self._turn_rate(heading_error(pose, approach.goal)))
+            off = heading_error(pose, approach.goal)
+            if obstacle := self.outline_on(pose, Twist.planar(wz=off), 1.0):
+                return blocked_path(self.mesh_map, pose, obstacle)
+            return self._command(0.0, self._turn_rate(off))
         direction = self._fields[self._leg].direction_at(self.mesh_map, spot)
         if direction is None:
             return ControlResult(ExePathOutcome.MISSED_PATH, "the vector field does not lead on from here")
@@ -113,7 +116,8 @@ class VectorFieldController(SteeringFollower):
         ahead = rotated_back(pose.rotation, direction)
         is_slow = p.acc_lim_x < math.inf
         fastest = speed_before_bends(places[:, :2], OBSTACLE_STEP, p, p.max_vel_theta) if is_slow else math.inf
-        return self._steer(math.atan2(ahead[1], ahead[0]), ground_distance(pose, approach.goal), fastest)
+        result = self._steer(math.atan2(ahead[1], ahead[0]), ground_distance(pose, approach.goal), fastest)
+        return self.fitting(request, result, p.max_vel_x, 1.0)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the last leg has been driven to its end, and the last pose of the plan is reached."""

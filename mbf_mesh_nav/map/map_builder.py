@@ -96,7 +96,8 @@ def build_mesh_map(
         mesh = densify(mesh, parameters.densify, file=file or "arrays")
     mesh_map = MeshMap(build_topology(mesh), frame_id, report, parameters.inscribed_radius)
     mesh_map.survey = survey_of(file)
-    mesh_map.footprint, mesh_map.max_turning_slope = parameters.footprint, parameters.max_turning_slope
+    mesh_map.footprint, mesh_map.check_footprint = parameters.footprint, parameters.check_footprint
+    mesh_map.max_turning_slope = parameters.max_turning_slope
     if plan:
         if (errors := read_vertex_errors(Path(file)) if file else None) is not None:
             on_mesh = errors_on_mesh(errors, mesh_map.internal_to_input, mesh_map.faces)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import field_validator
+from pydantic import field_validator, model_validator
 
 from mbf_abstract.maps.layers.layer_list import (
     LayerEntry,
@@ -76,6 +76,11 @@ class MeshMapParameters(OutlineParameters):
         unit="m",
         ge=0.0,
     )
+    check_footprint: bool = parameter(
+        False,
+        "Whether the footprint, too, has to fit wherever plans and motions lead: for long robots among walls. Without, "
+        "the disc of inscribed_radius has to.",
+    )
     max_turning_slope: float = parameter(
         0.35, "Steeper ground is not turned on in a recovery.", unit="rad", gt=0.0, le=1.5, dynamic=False
     )
@@ -95,6 +100,12 @@ class MeshMapParameters(OutlineParameters):
         if {JOIN, KEEP_APART} <= set(names):
             raise ValueError(f"either {JOIN} or {KEEP_APART}")
         return names
+
+    @model_validator(mode="after")
+    def _what_is_checked_is_known(self) -> MeshMapParameters:
+        if self.check_footprint and not self.footprint:
+            raise ValueError("check_footprint needs a footprint, which is empty")
+        return self
 
     def repairs_for(self, file: str) -> tuple[str, ...]:
         """Names of ``REPAIRS`` to apply to a mesh from ``file``, "" for arrays: the listed ones and the format's."""

@@ -207,11 +207,12 @@ class MeshMap(SnapshotAnswers):
         return chosen
 
     def take_parameters(self, parameters: Any) -> None:
-        """Take over ``edge_cost_factor``, ``inscribed_radius`` and ``footprint`` of ``MeshMapParameters``."""
+        """Take over ``edge_cost_factor`` and what is known of the robot of ``MeshMapParameters``."""
         self.fit_layers(parameters.inscribed_radius)
         if parameters.edge_cost_factor != self.edge_cost_factor:
             self.set_edge_cost_factor(parameters.edge_cost_factor)
         self.inscribed_radius, self.footprint = parameters.inscribed_radius, parameters.footprint
+        self.check_footprint = parameters.check_footprint
 
     def apply(self, event: Callable[[MeshLayer], IntArray]) -> None:
         """Give an event to every layer, see ``LayerGraph.apply``, and show plugins the map that follows."""

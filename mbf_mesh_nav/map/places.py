@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
-from mbf_abstract.maps.queries import CellState, Fit, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.maps.queries import CellState, Fit, PlaceAnswer, PlaceCheck, PlaceQuery, PoseAnswer
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 from mbf_mesh_nav.kernels.mesh.touching_discs import blocked_places, touching_discs
@@ -124,12 +124,16 @@ class MeshPlaces:
         is_free = bool(np.all((costs < FORBIDDEN_COST) & ~lethal))
         return PlaceAnswer(CellState.FREE if is_free else CellState.LETHAL, float(costs.max()))
 
-    def find_valid_pose(self, pose: Pose, dist_tolerance: float, query: PlaceQuery) -> PoseAnswer:
-        """Nearest pose within ``dist_tolerance`` [m] where the disc fits: the pose itself, else a vertex near it.
+    def find_valid_pose(
+        self, pose: Pose, dist_tolerance: float, query: PlaceQuery, fits: PlaceCheck | None = None
+    ) -> PoseAnswer:
+        """Nearest pose within ``dist_tolerance`` [m] where the robot fits: the pose itself, else a vertex near it.
 
-        Near a pose on the surface only vertices of the same storey count; a tolerance of inf means anywhere on it.
+        ``fits`` is the check of a pose; by default that of the disc, ``check_pose``. Near a pose on the surface only
+        vertices of the same storey count; a tolerance of inf means anywhere on it.
         """
-        first = self.check_pose(pose, query)
+        check = fits or (lambda there: self.check_pose(there, query))
+        first = check(pose)
         if first.state < CellState.LETHAL:
             return PoseAnswer(first.state, first.cost, pose)
         vertices, place = self.topology.vertices, self._on_surface(pose)
@@ -141,7 +145,7 @@ class MeshPlaces:
         for vertex in near[order[distances[order] <= dist_tolerance]]:
             x, y, z = vertices[vertex].tolist()
             there = replace(pose, position=(x, y, z))
-            answer = self.check_pose(there, query)
+            answer = check(there)
             if answer.state < CellState.LETHAL:
                 return PoseAnswer(answer.state, answer.cost, there)
         return PoseAnswer(first.state, first.cost, None)

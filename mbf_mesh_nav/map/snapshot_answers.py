@@ -16,9 +16,10 @@ from mbf_abstract.geometry.polyline import places_between
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.queries import PlaceCheck, PlaceQuery, PlaneCheck, PoseAnswer, in_plane
 from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.map.outline_on_ground import OutlineOnGround
 from mbf_mesh_nav.map.places import FORBIDDEN_COST, MeshPlaces
 from mbf_mesh_nav.map.places import SURFACE_DISTANCE as OF_PLACES
-from mbf_mesh_nav.map.robot_outline import OutlinedMap
+from mbf_mesh_nav.map.robot_outline import Corners, OutlinedMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.borders import beyond_border
 from mbf_mesh_nav.mesh.contact import contact_depth
@@ -51,15 +52,19 @@ class SnapshotAnswers(OutlinedMap):
     footprint : tuple of (x, y)
         Corners [m] of the robot's outline, for turns on the spot and for contacts with moving objects; empty = that
         disc.
+    check_footprint : bool
+        Whether the outline, too, has to fit wherever plans and motions lead, see ``outline_on_ground``.
     max_turning_slope : float
         Steeper ground [rad] is not turned on in a recovery.
     """
 
     inscribed_radius: float = 0.0
+    check_footprint: bool = False
     max_turning_slope: float = 0.35
 
     def __init__(self, topology: MeshTopology, locator: SurfaceLocator) -> None:
         super().__init__()
+        self._outlines: tuple[tuple[int, Corners], dict[float, OutlineOnGround]] | None = None
         self.topology, self.locator = topology, locator
         self.vertices = topology.vertices
         self.faces = topology.faces
@@ -131,25 +136,49 @@ class SnapshotAnswers(OutlinedMap):
         return int(lines[np.argmax(outside)]) if outside.any() else -1
 
     def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
-        """State and summed cost below the robot's disc."""
+        """State and summed cost below the robot's disc; LETHAL where its outline has to fit and does not."""
         places = self.places()
-        return places.check_point if center_only else lambda pose: places.check_pose(pose, query)
+        return places.check_point if center_only else self._fitting(lambda pose: places.check_pose(pose, query), query)
 
     def path_check(self, query: PlaceQuery) -> PlaceCheck:
-        """State of the ground below the robot's centre as planners look at it: LETHAL where it costs too much."""
+        """State of the ground below the robot's centre as planners look at it: LETHAL where it costs too much.
+
+        It is LETHAL, too, where the outline has to fit and does not.
+        """
         places = self.places()
-        return lambda pose: places.check_on_path(pose, query.safety_dist)
+        return self._fitting(lambda pose: places.check_on_path(pose, query.safety_dist), query)
 
     def plane_check(self, query: PlaceQuery, frame: Transform) -> PlaneCheck:
         """As ``pose_check`` and ``path_check`` say, for all poses in a few kernels."""
-        fit = self.places().fit_check(query)
-        return lambda poses: fit(in_plane(frame, poses))
+        fit, outline = self.places().fit_check(query), self.outline(query.safety_dist)
+        if outline is None:
+            return lambda poses: fit(in_plane(frame, poses))
+        return outline.fit_check(fit, frame, self.locator)
+
+    def outline(self, safety_dist: float = 0.0) -> OutlineOnGround | None:
+        """The robot's outline, grown by ``safety_dist`` [m], on the map as it is now; None where a disc will do."""
+        if not self.check_footprint:
+            return None
+        snapshot, kept = self.snapshot(), self._outlines
+        asked = snapshot.version, self.footprint
+        if kept is None or kept[0] != asked:
+            kept = self._outlines = asked, {}
+        if safety_dist not in kept[1]:
+            corners = np.array(self.footprint)
+            grown = corners + safety_dist * np.sign(corners)  # as costmap_2d pads footprints
+            kept[1][safety_dist] = OutlineOnGround(self.topology, snapshot, grown)
+        return kept[1][safety_dist]
+
+    def _fitting(self, check: PlaceCheck, query: PlaceQuery) -> PlaceCheck:
+        """A check that says LETHAL, too, where the outline has to fit and does not."""
+        outline = self.outline(query.safety_dist)
+        return check if outline is None else outline.pose_check(check, self.locator)
 
     def find_valid_pose(
         self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
     ) -> PoseAnswer:
-        """Nearest pose where the disc fits; a disc has no heading, so the angle does not matter."""
-        return self.places().find_valid_pose(pose, dist_tolerance, query)
+        """Nearest pose where the robot fits with the heading of ``pose``; for a disc the angle does not matter."""
+        return self.places().find_valid_pose(pose, dist_tolerance, query, self.pose_check(query))
 
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
         """Where the robot would come onto forbidden ground or past a border, or that it is too steep to turn.
@@ -176,7 +205,10 @@ class SnapshotAnswers(OutlinedMap):
         if turns and (slope := slope_at(self.topology, place)) > self.max_turning_slope:
             return f"the ground slopes {slope:.2f} rad, turning is allowed up to {self.max_turning_slope:g} rad"
         ranks = self.snapshot().traversability_rank(cost_limit)
-        if turns and self.footprint:
+        outline = self.outline()
+        if outline is not None and (swept := outline.swept(place, pose, command, duration)):
+            return swept
+        if turns and self.footprint and not (outline is not None and may_overhang):
             motion = place, pose, command, duration, self.footprint
             if swept := swept_obstacle(self.topology, ranks, *motion, may_overhang=may_overhang):
                 return swept

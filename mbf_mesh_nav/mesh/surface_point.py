@@ -9,7 +9,7 @@ import numpy as np
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
-from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.mesh.locate import Location, SurfacePoint
 
 ON_EDGE = 1e-9
 INFINITELY_FAR = np.float32(np.inf)
@@ -18,6 +18,11 @@ INFINITELY_FAR = np.float32(np.inf)
 def nearest_corner(mesh_map: MeshMap, point: SurfacePoint) -> int:
     """Return the corner of the point's face with the largest barycentric coordinate."""
     return int(mesh_map.faces[point.face, np.argmax(point.barycentric)])
+
+
+def nearest_corners(mesh_map: MeshMap, spots: Location) -> IntArray:
+    """As ``nearest_corner``, of many points that lie on the surface (n,)."""
+    return np.asarray(mesh_map.faces[spots.faces, np.argmax(spots.barycentric, axis=1)])
 
 
 def passes_blocked_corner(start: SurfacePoint, end: SurfacePoint, blocked: BoolArray) -> bool:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.maps.controllers.braking import BrakesOnItsArc, LastFreeArc
-from mbf_abstract.maps.controllers.failures import no_path, obstacle_text, outside_map
+from mbf_abstract.maps.controllers.failures import blocked_path, no_path, obstacle_text, outside_map
 from mbf_abstract.maps.controllers.inertia import InertiaParameters
 from mbf_abstract.maps.controllers.keeping_to_path import KeepingToPath
 from mbf_abstract.maps.controllers.motion_limits import MotionLimits
@@ -25,6 +25,7 @@ from mbf_mesh_nav.motion.goal_approach import GoalApproach
 from mbf_mesh_nav.plugins import MeshContext, MeshController
 
 OBSTACLE_STEP = 0.1  # m between two looks along a path
+OUTLINE_LOOK = 0.5  # s, over which an outline that has to fit does on the motion of a command
 
 
 class SurfaceFollower(MeshController):
@@ -67,6 +68,13 @@ class SurfaceFollower(MeshController):
             if not may_enter(before, now):
                 return obstacle_text(position_text(place))
         return ""
+
+    def outline_on(self, pose: Pose, command: Twist, duration: float = OUTLINE_LOOK) -> str:
+        """What the robot's outline would touch on a motion, as a text; empty if nothing, or if its disc will do."""
+        if (outline := self.mesh_map.outline()) is None:
+            return ""
+        spot = self.mesh_map.locate_one(pose.position)
+        return "" if spot is None else outline.swept(spot, pose, command, duration)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the path has been driven to its last pose, and that is reached."""
@@ -117,9 +125,19 @@ class SteeringFollower(KeepingFollower, BrakesOnItsArc):
     def closely(self, request: ControlRequest, fastest: float, *, is_stuck: bool = False) -> ControlResult | None:
         """The motion that keeps to the path where that is to be, see ``KeepingToPath``, at most ``fastest`` [m/s].
 
-        It is asked for robots that state their inertia; others drive as before, bit for bit.
+        It is asked for robots that state their inertia, or whose outline has to fit; others drive as before, bit for
+        bit.
         """
         p: Any = self.parameters
-        if p.acc_lim_x == math.inf:
+        if p.acc_lim_x == math.inf and not self.mesh_map.check_footprint:
             return None
         return self._keeping.closely(request, MotionLimits(0.0, fastest, p.max_vel_theta), is_stuck=is_stuck)
+
+    def fitting(self, request: ControlRequest, result: ControlResult, fastest: float, seconds: float) -> ControlResult:
+        """A motion along which the outline fits for some ``seconds``, if it has to: the given one, or a closer one."""
+        if not isinstance(result.command, Twist):
+            return result
+        obstacle = self.outline_on(request.pose, result.command, seconds)
+        if not obstacle:
+            return result
+        return self.closely(request, fastest, is_stuck=True) or blocked_path(self.mesh_map, request.pose, obstacle)

@@ -29,8 +29,8 @@ from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner
 from mbf_mesh_nav.mesh.topology import group_of_each
-from mbf_mesh_nav.search.leg_search import Leg
-from mbf_mesh_nav.search.surface_planner import failure_of_leg, named_poses, path_of_legs
+from mbf_mesh_nav.search.leg_search import Leg, path_of_legs
+from mbf_mesh_nav.search.surface_planner import failure_of_leg, named_poses
 from mbf_mesh_nav.tiles.places import TilePlace
 from mbf_mesh_nav.tiles.planning import SURFACE_DISTANCE, TOLERANCE, place_on_tiles, plan_between
 from mbf_mesh_nav.tiles.sensed import NOTHING_SENSED

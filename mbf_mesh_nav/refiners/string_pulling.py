@@ -32,7 +32,7 @@ from mbf_mesh_nav.kernels.motion.path_poses import poses_along
 from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.plugins import MeshRefiner
 from mbf_mesh_nav.search.corridor import Corridor, Piece
-from mbf_mesh_nav.search.surface_planner import SAME_POINT
+from mbf_mesh_nav.search.leg_search import SAME_POINT
 from mbf_mesh_nav.search.touched_places import TouchedPlaces
 
 FLAT = 1e-6

@@ -6,14 +6,15 @@ surface normals here as well, so a planner is only the choice of a kernel.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import Path, Pose
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.motion.path_poses import points_on_branch
+from mbf_mesh_nav.kernels.motion.path_poses import points_on_branch, poses_along
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, propagate_distances
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
@@ -21,6 +22,8 @@ from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.surface_point import corner_distances
 from mbf_mesh_nav.search.path_cost import cost_along
 
+SAME_POINT = 1e-6
+"""Points of a path so near [m] to each other are one."""
 NO_TARGETS = np.zeros(0, dtype=np.int32)
 NO_OFFSETS = np.zeros(0, dtype=np.float32)
 
@@ -55,6 +58,34 @@ class Leg:
     cost: float
     guidance: Any = None
     note: str = ""
+
+
+def joined(first: Leg, second: Leg) -> Leg:
+    """One leg of two, the second of which begins where the first one ends."""
+    positions = np.concatenate([first.positions, second.positions[1:]])
+    normals = np.concatenate([first.normals, second.normals[1:]])
+    return Leg(positions, normals, first.cost + second.cost, None, first.note or second.note)
+
+
+def points_on_leg(leg: Leg, lengths: FloatArray, at: FloatArray) -> FloatArray:
+    """Points (k, 3) [m] at lengths (k,) along a leg whose points have ``lengths`` (n,) [m]; beyond its ends, those."""
+    return np.column_stack([np.interp(at, lengths, leg.positions[:, axis]) for axis in range(3)])
+
+
+def path_of_legs(legs: Sequence[Leg], goal: Pose, ends_there: bool, frame_id: str, stamp: float) -> Path:
+    """One path of all legs; every pose looks to the next one and stands on the surface, the last one looks as ``goal``.
+
+    It ends at the position of ``goal``, too, if it ``ends_there``.
+    """
+    positions = np.concatenate([legs[0].positions[:1]] + [leg.positions[1:] for leg in legs])
+    normals = np.concatenate([legs[0].normals[:1]] + [leg.normals[1:] for leg in legs])
+    if ends_there:
+        positions[-1] = goal.position
+    positions, orientations, sound = poses_along(positions, normals, SAME_POINT)
+    orientations[-1] = goal.orientation
+    guidance = tuple(leg.guidance for leg in legs if leg.guidance is not None) or None
+    path = Path.of_checked_arrays if sound else Path
+    return path(positions, orientations, frame_id, stamp, guidance)
 
 
 def propagate_from(

@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import itertools
 from abc import abstractmethod
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.goals.arrival_tolerance import ends_beside, not_even_beside
 from mbf_abstract.maps.getting_free import getting_free
@@ -25,7 +24,6 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_mesh_nav.arrays import BoolArray, Float32Array
-from mbf_mesh_nav.kernels.motion.path_poses import poses_along
 from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.map.ground import ground_heights, heights_text
 from mbf_mesh_nav.map.places import FORBIDDEN_COST
@@ -36,12 +34,10 @@ from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner, surface_point_at_vertex
 from mbf_mesh_nav.plugins import MeshContext, MeshPlanner
 from mbf_mesh_nav.search.blocked_vertices import BlockedVertices
+from mbf_mesh_nav.search.fitting.outline_check import PADDING, OutlineCheck
 from mbf_mesh_nav.search.heading_check import HeadingCheck
-from mbf_mesh_nav.search.leg_search import Leg, LegQuery, propagate_from
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery, path_of_legs, propagate_from
 from mbf_mesh_nav.search.permanent_walls import as_permanent
-
-SAME_POINT = 1e-6
-"""Points of a path so near [m] to each other are one."""
 
 
 class SurfacePlannerParameters(PluginParameters):
@@ -77,6 +73,7 @@ class SurfacePlanner(MeshPlanner):
         super().__init__(context)
         self._blocked_vertices = BlockedVertices(context.navigation_map)
         self._heading_check = HeadingCheck(context.navigation_map)
+        self._outline_check = OutlineCheck(context.navigation_map)
 
     @abstractmethod
     def find_leg(self, query: LegQuery) -> Leg | None:
@@ -95,6 +92,18 @@ class SurfacePlanner(MeshPlanner):
     def find_other_leg(self, query: LegQuery) -> Leg | None:
         """As ``find_leg``, with vertices blocked that are free on the map: nothing may be remembered of it."""
         return self.find_leg(query)
+
+    def _driveable_leg(self, query: LegQuery, is_first: bool, is_last: bool) -> Leg | PlanResult | None:
+        """The best leg whose headings the tilt allows, and along which the outline fits, if it has to; or why none.
+
+        Via points are passed with any heading.
+        """
+        leg, outline = self._held_leg(query), self.mesh_map.outline(PADDING)
+        if leg is None or outline is None:
+            return leg
+        start_pose, goal_pose = query.start_pose if is_first else None, query.goal_pose if is_last else None
+        asked = replace(query, start_pose=start_pose, goal_pose=goal_pose)
+        return self._outline_check.leg_that_fits(asked, outline, leg, self.find_other_leg)
 
     def _held_leg(self, query: LegQuery) -> Leg | None:
         """The best leg whose headings the tilt allows, see ``heading_check``."""
@@ -120,15 +129,16 @@ class SurfacePlanner(MeshPlanner):
         for index, (start, goal) in enumerate(itertools.pairwise(stops)):
             ends = poses[index], poses[index + 1]
             tolerance = request.angle_tolerance if index == len(request.via) else 0.0
-            leg = self._held_leg(LegQuery(start, goal, snapshot, blocked, request.cancel_token.flag, *ends, tolerance))
-            if leg is None:
-                problem = failure_of_leg(self._no_path(start, goal, blocked), index, request)
+            query = LegQuery(start, goal, snapshot, blocked, request.cancel_token.flag, *ends, tolerance)
+            leg = self._driveable_leg(query, index == 0, index == len(request.via))
+            if not isinstance(leg, Leg):
+                problem = failure_of_leg(leg or self._no_path(start, goal, blocked), index, request)
                 break
             legs.append(leg)
         near_goal = problem is not None and len(legs) == len(request.via) and request.dist_tolerance > 0.0
         if near_goal and not request.cancel_token.cancelled:
-            leg = self._leg_near_goal(stops[len(legs)], request, snapshot, blocked)
-            legs, problem = ([*legs, leg], None) if leg is not None else (legs, problem)
+            near = self._leg_near_goal(stops[len(legs)], request, snapshot, blocked)
+            legs, problem = ([*legs, near], None) if near is not None else (legs, problem)
 
         # 4. One path of all legs, ending with the requested pose.
         if request.cancel_token.cancelled:
@@ -214,27 +224,12 @@ class SurfacePlanner(MeshPlanner):
             vertex = int(np.argmin(offsets))
             if offsets[vertex] > request.dist_tolerance or vertex == tried:
                 return None
-            leg = self._held_leg(replace(query, goal=surface_point_at_vertex(mesh_map, vertex)))
-            if leg is not None:
+            asked = replace(query, goal=surface_point_at_vertex(mesh_map, vertex))
+            leg = self._driveable_leg(asked, not request.via, True)
+            if isinstance(leg, Leg):
                 return leg
             tried = vertex  # a search may find out what ``reach`` did not know
         return None
-
-
-def path_of_legs(legs: Sequence[Leg], goal: Pose, ends_there: bool, frame_id: str, stamp: float) -> Path:
-    """One path of all legs; every pose looks to the next one and stands on the surface, the last one looks as ``goal``.
-
-    It ends at the position of ``goal``, too, if it ``ends_there``.
-    """
-    positions = np.concatenate([legs[0].positions[:1]] + [leg.positions[1:] for leg in legs])
-    normals = np.concatenate([legs[0].normals[:1]] + [leg.normals[1:] for leg in legs])
-    if ends_there:
-        positions[-1] = goal.position
-    positions, orientations, sound = poses_along(positions, normals, SAME_POINT)
-    orientations[-1] = goal.orientation
-    guidance = tuple(leg.guidance for leg in legs if leg.guidance is not None) or None
-    path = Path.of_checked_arrays if sound else Path
-    return path(positions, orientations, frame_id, stamp, guidance)
 
 
 def named_poses(request: PlanRequest) -> list[tuple[str, Pose]]:
