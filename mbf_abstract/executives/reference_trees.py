@@ -37,7 +37,8 @@ from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome
 
 BLOCKED = (ExePathOutcome.BLOCKED_PATH, ExePathOutcome.BLOCKED_GOAL, ExePathOutcome.NO_VALID_CMD)
-OFF_THE_PATH = (ExePathOutcome.MISSED_PATH, ExePathOutcome.MISSED_GOAL)
+OFF_THE_PATH = (ExePathOutcome.MISSED_PATH,)
+PAST_THE_GOAL = (ExePathOutcome.MISSED_GOAL,)
 IN_CONTACT = (ExePathOutcome.COLLISION, ExePathOutcome.ROBOT_STUCK)
 SECOND_PLANNER_SLOT = 1
 LOOK_PERIOD = 0.3
@@ -174,10 +175,16 @@ def _recovery(options: TreeOptions) -> Behaviour:
     guards = [
         OutcomeGuard("in contact", _in_turn("free", o.out_of_collision, o.move_away, o.clear), IN_CONTACT),
         OutcomeGuard("blocked", _unblock(options), BLOCKED),
+        OutcomeGuard("past the goal", _plan_at_once(o, "plan back to it"), PAST_THE_GOAL),
         OutcomeGuard("off the path", _in_turn("loosen", o.relax_controller, o.clear), OFF_THE_PATH),
         OutcomeGuard("other", _in_turn("others", o.clear, o.relax_controller, o.move_away), recovery_would_help),
     ]
     return PickByOutcome("recover by outcome", guards)
+
+
+def _plan_at_once(options: TreeOptions, name: str) -> Behaviour:
+    """No recovery: the next thing is a plan. Every recovery that succeeds is followed by one, or one that fails is."""
+    return Failure(name) if options.reuse_path else Success(name)
 
 
 def _unblock(options: TreeOptions) -> Behaviour:

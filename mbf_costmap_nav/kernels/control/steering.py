@@ -55,7 +55,7 @@ def best_sequence(
     steering_cost : float
         Of the square of a change of curvature [m^4].
     reach : float
-        How far [m] the outline's farthest end is before the base.
+        How far [m] before the base the end of the outline is that is kept to the path; negative = behind.
     step : float
         Farthest distance [m] of poses on an arc that are looked at.
     first_step : float

@@ -184,3 +184,23 @@ def test_mppi_keeps_a_car_to_the_manoeuvre_that_its_samples_would_cut(make_plugi
     assert controller.set_plan(path)
     command = controller.compute_velocity_commands(ControlRequest(Pose.planar(*start), Twist())).command
     assert 0.0 < abs(command.vx) <= 0.2
+
+
+LONG_OUTLINE = [(0.45, 0.2), (-0.45, 0.2), (-0.45, -0.2), (0.45, -0.2)]
+
+
+@pytest.mark.parametrize("first_corner", [0, 2])
+@pytest.mark.parametrize("base", [-0.3, 0.0, 0.3], ids=["base at the rear", "in the middle", "at the front"])
+@pytest.mark.parametrize("gear", [1.0, -1.0], ids=["forward", "in reverse"])
+@pytest.mark.parametrize(("off", "turned"), [(0.15, 0.0), (-0.15, 0.1), (0.1, -0.15)])
+def test_a_car_beside_a_straight_path_comes_back_to_it_and_stays(make_plugin, first_corner, base, gear, off, turned):
+    corners = np.roll(LONG_OUTLINE, first_corner, axis=0) - (base, 0.0)
+    grid, yaw = Costmap(np.zeros((60, 280), dtype=np.uint8), 0.05), 0.0 if gear > 0.0 else math.pi
+    along = np.arange(1.5, 11.5, 0.05)
+    path = Path.from_poses([Pose.planar(x, 1.5, yaw) for x in along.tolist()])
+    car = {"footprint": Footprint(corners.tolist()), "turning_radius": RADIUS}
+    controller = make_plugin(RegulatedPurePursuitController, grid, **car)
+    ending, beside = drive(controller, path, (1.5, 1.5 + off, yaw + turned))
+    assert ending == "arrived"
+    settled = len(beside) // 2
+    assert beside[settled:, 0].max() < 0.02, "it has come back by the middle of the path"

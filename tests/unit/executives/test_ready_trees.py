@@ -20,6 +20,7 @@ from mbf_abstract.testing.scripted import ScriptedRefiner, straight_plan
 GOAL = Pose.planar(2.0, 0.0)
 NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")
 BLOCKED = ControlResult(ExePathOutcome.BLOCKED_PATH, "a chair")
+PAST_IT = ControlResult(ExePathOutcome.MISSED_GOAL, "0.2 m past it")
 COLLISION = ControlResult(ExePathOutcome.COLLISION, "a wall")
 OPTIONS = TreeOptions(check_poses=False, second_planner_pause=0.0)
 
@@ -89,6 +90,14 @@ def test_recoveries_of_driving_are_picked_by_code_and_the_path_is_kept(make_sess
     assert run(session, navigation_tree(OPTIONS)).success
     assert recoveries(session) == ["back_up", "clear"]
     assert plans(session) == 1
+
+
+@pytest.mark.parametrize("reuse_path", [True, False])
+def test_a_robot_past_its_goal_gets_a_new_plan_and_what_it_has_seen_is_kept(make_session, recoveries, reuse_path):
+    session = make_session()
+    session.controller.play(PAST_IT, PAST_IT, session.controller.follow)
+    assert run(session, navigation_tree(replace(OPTIONS, reuse_path=reuse_path))).success
+    assert (plans(session), recoveries(session)) == (3, [])
 
 
 def test_after_a_recovery_the_rest_of_the_path_is_driven(make_session):
