@@ -8,7 +8,7 @@ from their path, and fast ones: the samples end ``FARTHEST`` ahead.
 Rule: all sequences of arcs over ``PIECES`` with ``STEERINGS`` of the tightest curve are driven in thought. The best one
 keeps the outline nearest to where it would be on the path: the squares of how far the base, and the end of the outline
 that leads, are beside there, at the end of each arc, and a little for every turn of the steering. An end that trails
-would be turned onto the path at once, and lead the car away from it. It is driven for one cycle.
+would be turned onto the path at once, and lead the car away from it, see ``_reach``. It is driven for one cycle.
 Cost: 0.1 to 0.3 ms a cycle; 2 ms for a bus of 12 m on cells of 0.1 m.
 """
 
@@ -29,6 +29,8 @@ PIECES = np.array([3.0, 5.0, 7.0]) / 35.0
 """Lengths of the arcs of a sequence, in radii of the tightest curve; longer at speed, shorter before a cusp."""
 STEERINGS = np.array([0.0, -1.0, 1.0, -0.5, 0.5, -0.2, 0.2])
 """Shares of the curvature of the tightest curve; of equally good ones the earlier counts."""
+SLIGHT = float(np.abs(STEERINGS[STEERINGS != 0.0]).min())
+"""The least of these shares that steers."""
 STEERING_COST = 1e-5
 """[m^2] What turning the steering from straight on to the tightest curve costs."""
 NOTHING_LEFT = 1e-3
@@ -45,7 +47,12 @@ NO_SAMPLES = np.zeros((0, 2))
 
 
 def steer_closely(
-    cycle: ControlCycle, radius: float, speed: float, parameters: RegulatedPurePursuitParameters
+    cycle: ControlCycle,
+    radius: float,
+    speed: float,
+    parameters: RegulatedPurePursuitParameters,
+    *,
+    is_tight: bool = False,
 ) -> float | None:
     """Change of heading per length [rad/m] that begins the best sequence; None where none follows the path freely.
 
@@ -55,6 +62,8 @@ def steer_closely(
         Of the car's tightest curve [m].
     speed : float
         That will be driven [m/s]; one against the direction of the path is that of a car which still has to stop.
+    is_tight : bool
+        Whether the place is, see ``tight_places``.
     """
     tracker, pose, velocity = cycle.tracker, cycle.request.pose, cycle.request.velocity
     ahead = max(abs(speed) * parameters.check_ahead_time, parameters.min_distance_to_obstacle) / cycle.limit_factor
@@ -69,7 +78,7 @@ def steer_closely(
     wanted = np.array([_pose_ahead(tracker, at) for at in (scale * np.add.accumulate(pieces)).tolist()])
     if scale * whole < NOTHING_LEFT or not _looks_along(wanted, direction):
         return None
-    reach, resolution = _reach(cycle, direction, radius), cycle.costmap.resolution
+    reach, resolution = _reach(cycle, direction, radius, is_tight=is_tight), cycle.costmap.resolution
     now = velocity.wz / abs(velocity.vx) if velocity.vx != 0.0 else 0.0
     curvature, beside = best_sequence(
         cycle.costmap.cells,
@@ -94,13 +103,17 @@ def _looks_along(wanted: FloatArray, direction: float) -> bool:
     return abs(math.remainder(math.atan2(dy, dx) - float(wanted[0, 2]), 2.0 * math.pi)) <= LOOKS_ALONG
 
 
-def _reach(cycle: ControlCycle, direction: float, radius: float) -> float:
-    """How far [m] before the base the end is that leads in a direction, negative where that is backward.
+def _reach(cycle: ControlCycle, direction: float, radius: float, *, is_tight: bool) -> float:
+    """How far [m] before the base the end is that is kept to the path, negative where that is behind.
 
-    It is ``LEAST_LEAD`` radii of the tightest curve at least: of a short end the car would learn too late.
+    It is the one that leads, ``LEAST_LEAD`` radii of the tightest curve away at least: of a short end the car would
+    learn too late. In the short strokes in reverse of a tight place the nose hits something first, if it is farther.
     """
     along = direction * cycle.footprint.footprint.vertices[:, 0]
-    return direction * max(float(along.max(initial=0.0)), LEAST_LEAD * radius)
+    leads, trails = float(along.max(initial=0.0)), float(-along.min(initial=0.0))
+    if is_tight and direction < 0.0 and trails > leads:
+        return trails
+    return direction * max(leads, LEAST_LEAD * radius)
 
 
 def _farthest(cycle: ControlCycle) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from mbf_abstract.geometry import Twist, normalize_angle
 from mbf_abstract.maps.controllers.inertia import PLANNED, braking_distance, speed_on_path, stopping_speed, within
 from mbf_abstract.maps.controllers.room_to_turn import off_course
+from mbf_costmap_nav.control.close_steering import FARTHEST, SLIGHT, steer_closely
 from mbf_costmap_nav.control.path_geometry import look_ahead_point
 from mbf_costmap_nav.control.path_handling import ControlCycle, to_base_frame
 from mbf_costmap_nav.control.regulated_speed import RegulatedFollower
@@ -88,3 +89,20 @@ class PursuitSteering(RegulatedFollower):
         if p.control_period is not None or braking_distance(speed, p.acc_lim_x) > look_ahead:
             on_path = speed_on_path(cycle.tracker, speed, look_ahead, self.known_inertia, p.max_vel_theta)
         return min(max(stopping, p.min_approach_vel), on_path)
+
+    def _swiftly(self, cycle: ControlCycle, backward: bool, slowest: float) -> Twist | None:
+        """The arc by which a car keeps best to a nearly straight path, at the speed that this allows.
+
+        None where the path is not, where the arc is not, and where that is no faster than ``slowest`` [m/s].
+        """
+        p, slight = self.parameters, SLIGHT / self.turning_radius
+        curvature = self._curvature_to(self._carrot(cycle))
+        wanted = self._drive(cycle, math.copysign(slight, curvature), backward).vx
+        seen = FARTHEST * max(1.0, self.turning_radius) * cycle.limit_factor
+        speed = math.copysign(min(abs(wanted), seen / max(p.check_ahead_time, p.period)), wanted)
+        if abs(curvature) > slight or abs(speed) <= abs(slowest):
+            return None
+        chosen = steer_closely(cycle, self.turning_radius, speed, p)
+        if chosen is None or abs(chosen) > slight:
+            return None
+        return Twist.planar(speed, wz=abs(speed) * chosen)

@@ -146,13 +146,17 @@ class RegulatedPurePursuitController(LeavesContacts, RollingPursuit):
         self._known_free = None
         if self.turning_radius == 0.0 or cycle.touches:
             return None
+        assert self.tracker is not None
         tightest = self._drive(cycle, 1.0 / self.turning_radius, backward)
+        swift = None if is_tight else self._swiftly(cycle, backward, tightest.vx)
+        if swift is not None and not self._blocked(cycle, swift):
+            self.tracker.cusp_reached = CLOSELY
+            return swift
         creeping = self._slowed(Twist.planar(-CREEPING if backward else CREEPING), cycle.request.velocity)
         speed = creeping.vx if is_tight else tightest.vx
-        curvature = steer_closely(cycle, self.turning_radius, speed, self.parameters)
+        curvature = steer_closely(cycle, self.turning_radius, speed, self.parameters, is_tight=is_tight)
         if curvature is None:
             return None
-        assert self.tracker is not None
         self.tracker.cusp_reached = CLOSELY
         self._known_free = Twist.planar(speed, wz=abs(speed) * curvature)
         return self._known_free

@@ -186,6 +186,32 @@ def test_mppi_keeps_a_car_to_the_manoeuvre_that_its_samples_would_cut(make_plugi
     assert 0.0 < abs(command.vx) <= 0.2
 
 
+def test_a_car_drives_as_fast_as_it_may_where_its_path_is_straight_and_slowly_in_its_tightest_curve(make_plugin):
+    grid = Costmap(np.zeros((200, 280), dtype=np.uint8), 0.05)
+    turns = np.clip((np.arange(0.0, 13.0, 0.05) - 6.0) / 0.75, 0.0, 0.5 * math.pi)  # straight on, and left round
+    steps = np.column_stack([np.cos(turns), np.sin(turns)]) * 0.05
+    places = np.array([1.0, 1.0]) + np.cumsum(steps, axis=0)
+    path = Path.from_poses(
+        [Pose.planar(x, y, yaw) for (x, y), yaw in zip(places.tolist(), turns.tolist(), strict=True)]
+    )
+    controller = make_plugin(RegulatedPurePursuitController, grid, footprint=CAR, turning_radius=RADIUS)
+    speeds, answer = [], controller.compute_velocity_commands
+
+    def noting(request):
+        result = answer(request)
+        speeds.append((request.pose.x, request.pose.y, result.command.vx))
+        return result
+
+    controller.compute_velocity_commands = noting
+    ending, beside = drive(controller, path, (1.05, 1.0, 0.0))
+    assert ending == "arrived" and beside[:, 0].max() < 0.05
+    full = controller.parameters.max_vel_x
+    along = np.array(speeds)
+    straight, curve = (along[:, 0] > 2.0) & (along[:, 0] < 5.5), (along[:, 0] > 7.0) & (along[:, 1] < 1.5)
+    assert along[straight, 2].min() == pytest.approx(full)
+    assert along[curve, 2].max() < 0.9 * full
+
+
 LONG_OUTLINE = [(0.45, 0.2), (-0.45, 0.2), (-0.45, -0.2), (0.45, -0.2)]
 
 
