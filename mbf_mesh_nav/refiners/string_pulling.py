@@ -7,8 +7,9 @@ follow edges. When not: behind ``mesh.any_angle`` and ``mesh.cvp``, whose paths 
 Start and goal stay. Each piece of the path is replaced by the geodesic near it, or by the shortest path through its
 own faces, or its two halves are, whichever has the least cost: length plus the map's costs integrated along it. So the
 result never costs more than the path given. No new face has a blocked corner, nor does the robot touch anything where
-it touched nothing near there on the path given; where the path leads along edges between blocked faces it stays. A path
-that drives backward somewhere is handed back unchanged; one that leaves the map between its poses is a MAP_ERROR.
+it touched nothing near there on the path given, nor its outline where the map checks it; where the path leads along
+edges between blocked faces it stays. A path that drives backward somewhere is handed back unchanged; one that leaves
+the map between its poses is a MAP_ERROR.
 
 Formula: the funnel algorithm (Lee and Preparata 1984) in a corridor of faces that is turned round the vertices where
 that makes it shorter (Xin and Wang 2007), see ``kernels.wave.corridors``.
@@ -32,6 +33,8 @@ from mbf_mesh_nav.kernels.motion.path_poses import poses_along
 from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.plugins import MeshRefiner
 from mbf_mesh_nav.search.corridor import Corridor, Piece
+from mbf_mesh_nav.search.fitting.misfits import new_misfits
+from mbf_mesh_nav.search.fitting.outline_check import PADDING
 from mbf_mesh_nav.search.leg_search import SAME_POINT
 from mbf_mesh_nav.search.touched_places import TouchedPlaces
 
@@ -71,10 +74,12 @@ class StringPullingRefiner(MeshRefiner, MapRefiner):
         piece = self._on_surface(Corridor(self.mesh_map, snapshot, blocked), path.positions)
         if isinstance(piece, RefineResult):
             return piece
-        touched = TouchedPlaces(self.mesh_map, snapshot)
+        touched, outline = TouchedPlaces(self.mesh_map, snapshot), self.mesh_map.outline(PADDING)
         for _ in range(ATTEMPTS):
             pulled = self._pulled(Corridor(self.mesh_map, snapshot, blocked), piece, cancel_token)
             new_faces = touched.new_faces(pulled, piece)
+            if outline is not None and not len(new_faces):
+                new_faces = new_misfits(self.mesh_map, outline, pulled[0], piece[0])
             if not len(new_faces) or cancel_token.cancelled:
                 return self._with_poses(path, pulled)
             blocked[self.mesh_map.faces[new_faces]] = True

@@ -23,7 +23,7 @@ from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.search.heading_limits import chassis_of
-from mbf_mesh_nav.search.leg_search import Leg, LegQuery, points_on_leg
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery, points_at
 
 SPACING = 0.1
 """Length [m] of the pieces of a path that are swept one by one."""
@@ -98,14 +98,15 @@ class HeadingCheck:
         count = max(int(np.ceil(lengths[-1] / SPACING)), 1)
         at = np.linspace(0.0, lengths[-1], count + 1)
         middles = 0.5 * (at[:-1] + at[1:])
-        points, spots = points_on_leg(leg, lengths, at), mesh_map.locate(points_on_leg(leg, lengths, middles))
+        points = points_at(leg.positions, lengths, at)
+        spots = mesh_map.locate(points_at(leg.positions, lengths, middles))
         corners = mesh_map.faces[spots.faces]
         vertices = corners[np.arange(count), np.argmax(spots.barycentric, axis=1)]
         ends = mesh_map.faces[[query.start.face, query.goal.face]]
         looked_at = self._forbid_some(layer)[corners].any(axis=1) & (vertices[:, None] != ends.ravel()).all(axis=1)
         places = np.flatnonzero(looked_at)
-        chords = points_on_leg(leg, lengths, middles[places] + 0.5 * CHORD)
-        chords -= points_on_leg(leg, lengths, middles[places] - 0.5 * CHORD)
+        chords = points_at(leg.positions, lengths, middles[places] + 0.5 * CHORD)
+        chords -= points_at(leg.positions, lengths, middles[places] - 0.5 * CHORD)
         flat = norm(chords[:, :2])
         places, chords = places[flat > 0.0], (chords[:, :2] / flat[:, None])[flat > 0.0]
         sweep = spots.faces[places], points[places], points[places + 1], chords

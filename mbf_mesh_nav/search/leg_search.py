@@ -67,9 +67,9 @@ def joined(first: Leg, second: Leg) -> Leg:
     return Leg(positions, normals, first.cost + second.cost, None, first.note or second.note)
 
 
-def points_on_leg(leg: Leg, lengths: FloatArray, at: FloatArray) -> FloatArray:
-    """Points (k, 3) [m] at lengths (k,) along a leg whose points have ``lengths`` (n,) [m]; beyond its ends, those."""
-    return np.column_stack([np.interp(at, lengths, leg.positions[:, axis]) for axis in range(3)])
+def points_at(positions: FloatArray, lengths: FloatArray, at: FloatArray) -> FloatArray:
+    """Points (k, 3) [m] at lengths (k,) along a line through positions with ``lengths`` (n,) [m], or its ends."""
+    return np.column_stack([np.interp(at, lengths, positions[:, axis]) for axis in range(3)])
 
 
 def path_of_legs(legs: Sequence[Leg], goal: Pose, ends_there: bool, frame_id: str, stamp: float) -> Path:

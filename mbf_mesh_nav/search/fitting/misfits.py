@@ -17,7 +17,7 @@ from mbf_mesh_nav.map.outline_on_ground import OutlineOnGround
 from mbf_mesh_nav.mesh.locate import Location
 from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.mesh.surface_point import nearest_corners
-from mbf_mesh_nav.search.leg_search import Leg, LegQuery, points_on_leg
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery, points_at
 
 SPACING = 0.025
 """Length [m] between the poses of a path that are looked at."""
@@ -66,20 +66,36 @@ class Misfits(NamedTuple):
 
 def misfits_of(mesh_map: MeshMap, query: LegQuery, outline: OutlineOnGround, leg: Leg) -> Misfits:
     """Where the outline touches something on a leg; not where it does from its start on, which it leaves."""
-    lengths = polyline_lengths(leg.positions)
+    leaves = query.start_pose is not None and outline.touches(query.start, query.start_pose)
+    return misfits_along(mesh_map, outline, leg.positions, leaves_contact=leaves)
+
+
+def misfits_along(
+    mesh_map: MeshMap, outline: OutlineOnGround, positions: FloatArray, *, leaves_contact: bool = False
+) -> Misfits:
+    """The same along a line through positions (n, 3) [m] on the surface."""
+    lengths = polyline_lengths(positions)
     count = max(int(np.ceil(lengths[-1] / SPACING)), 1)
     at = np.linspace(0.0, lengths[-1], count + 1)
-    spots = mesh_map.locate(points_on_leg(leg, lengths, at))
-    chords = points_on_leg(leg, lengths, at + 0.5 * CHORD) - points_on_leg(leg, lengths, at - 0.5 * CHORD)
+    spots = mesh_map.locate(points_at(positions, lengths, at))
+    chords = points_at(positions, lengths, at + 0.5 * CHORD) - points_at(positions, lengths, at - 0.5 * CHORD)
     upright = norm(chords[:, :2]) == 0.0
     chords[upright] = (1.0, 0.0, 0.0)
     vertices = outline.touched(spots, chords)
     touches = (vertices >= 0) & ~upright
-    if query.start_pose is not None and outline.touches(query.start, query.start_pose):
+    if leaves_contact:
         touches &= ~np.logical_and.accumulate(touches)
     below = nearest_corners(mesh_map, spots)
     chosen = chosen_of(spots, touches)
     return Misfits(chosen, chords[touches], vertices[touches], below[touches], at[touches], float(lengths[-1]))
+
+
+def new_misfits(mesh_map: MeshMap, outline: OutlineOnGround, changed: FloatArray, given: FloatArray) -> IntArray:
+    """Faces (k,) on which a changed line does not fit the outline, far from where the given one does not either."""
+    after, before = misfits_along(mesh_map, outline, changed), misfits_along(mesh_map, outline, given)
+    places = before.spots.points
+    far = [not (norm(places - place) <= outline.reach).any() for place in after.spots.points]
+    return np.unique(after.spots.faces[np.array(far, dtype=np.bool_)])
 
 
 def chosen_of(spots: Location, chosen: BoolArray) -> Location:

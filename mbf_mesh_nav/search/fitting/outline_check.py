@@ -30,7 +30,7 @@ from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.positions import position_text
 from mbf_mesh_nav.search.fitting.misfits import CHORD, Misfits, misfits_of, nearer_to_what_is_touched
 from mbf_mesh_nav.search.fitting.runs import Run, run_through_passage, runs_at
-from mbf_mesh_nav.search.leg_search import Leg, LegQuery, joined, points_on_leg
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery, joined, points_at
 
 PADDING = 0.01
 """A path fits the outline grown by so much [m], so that it fits between the poses that are looked at, too."""
@@ -144,7 +144,7 @@ class OutlineCheck:
         if not (at_start | at_goal).all():
             return None
         lengths = polyline_lengths(leg.positions)
-        places = points_on_leg(leg, lengths, np.array([0.0, CHORD, lengths[-1] - CHORD, lengths[-1]]))
+        places = points_at(leg.positions, lengths, np.array([0.0, CHORD, lengths[-1] - CHORD, lengths[-1]]))
         begin, end = (math.atan2(y, x) for x, y, _ in (places[1::2] - places[::2]).tolist())
         pose, goal = query.start_pose, query.goal_pose
         if pose is not None:

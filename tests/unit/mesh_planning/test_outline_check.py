@@ -10,6 +10,7 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
+from mbf_abstract.time.cancel import CancelToken
 from mbf_mesh_nav.controllers.mppi import MPPIController
 from mbf_mesh_nav.controllers.path_follower import PathFollower
 from mbf_mesh_nav.layers.inflation import InflationLayer
@@ -20,6 +21,7 @@ from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
+from mbf_mesh_nav.refiners.string_pulling import StringPullingRefiner
 
 PLANNERS = [AStarPlanner, DijkstraPlanner, AnyAnglePlanner, CVPPlanner]
 LONG = ((0.5, 0.25), (-0.5, 0.25), (-0.5, -0.25), (0.5, -0.25))
@@ -136,6 +138,17 @@ def test_via_points_are_passed_with_any_heading(floor, make_plugin):
     via = (Pose.planar(3.0, 3.0, 0.5 * math.pi),)
     request = PlanRequest(Pose.planar(1.0, 3.0), Pose.planar(5.0, 3.0), via=via)
     assert make_plugin(AStarPlanner, floor(*aisle)).make_plan(request).success
+
+
+def test_a_path_that_is_pulled_straight_keeps_its_turns_before_the_gap(floor, make_plugin):
+    mesh_map = floor(*GAP)
+    path = make_plugin(AStarPlanner, mesh_map).make_plan(THROUGH).path
+    free = floor(*GAP, check_footprint=False)
+    of_disc = make_plugin(StringPullingRefiner, free).apply_refinement(path, CancelToken()).path
+    assert misfits(free, of_disc) > 0, "the disc is pulled round the ends of the wall"
+    pulled = make_plugin(StringPullingRefiner, mesh_map).apply_refinement(path, CancelToken())
+    assert pulled.success, pulled.message
+    assert misfits(mesh_map, pulled.path) == 0
 
 
 @pytest.mark.parametrize("controller_class", [PathFollower, MPPIController])
