@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.system.ros2.environments import JAZZY, KILTED, clean_variables, end_with_parent, free_domain
+from tests.system.ros2.environments import JAZZY, KILTED, PEERS, clean_variables, end_with_parent, free_domain, profile
 
-PEERS = Path(__file__).parent / "peers"
-BRIEF_LEASE = {"FASTDDS_DEFAULT_PROFILES_FILE": str(PEERS / "brief_lease.xml")}
+BRIEF_LEASE = profile("brief_lease")
 WITHIN = 300.0  # s; nothing waits that long unless it fails
 ROBOT = """
 backend: costmap

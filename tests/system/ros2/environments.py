@@ -25,6 +25,8 @@ MBF = "from mbf_abstract.cli import main; main()"
 LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
 PR_SET_PDEATHSIG = 1
 BUILD_TIME = 3600.0  # s; two minutes of CPU, of which a busy machine may give a tenth
+PEERS = Path(__file__).parent / "peers"
+PROFILE_VARIABLES = "FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE"  # of Kilted, of Jazzy
 DOMAINS = range(1, 101)  # domains of DDS whose ports are not those that Linux gives to other programs
 
 
@@ -107,8 +109,13 @@ def clean_variables(folder, domain=0):
     """Environment variables for a peer: nothing of the caller's but where its packages are, which the peer shares."""
     kept = {name: os.environ[name] for name in ("PATH", "HOME", "NUMBA_CACHE_DIR") if name in os.environ}
     paths = [str(Path(folder) / "interfaces"), *(path for path in sys.path if path)]
-    discovery = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    return {**kept, **discovery, "PYTHONPATH": os.pathsep.join(paths)}
+    discovery = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}  # as the profile says
+    return {**kept, **discovery, **profile("loopback"), "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def profile(name):
+    """Environment variables that give a peer a profile of Fast DDS, a file of ``peers``."""
+    return dict.fromkeys(PROFILE_VARIABLES, str(PEERS / f"{name}.xml"))
 
 
 def end_with_parent():

@@ -59,6 +59,12 @@ def own_interfaces(distribution):
     return {interface_of(name) for name in {*types, *known} if types.get(name) != known.get(name)}
 
 
+def test_peers_of_tests_share_no_memory_that_a_killed_one_could_leave_locked(trio):
+    """The profile of Fast DDS counts for each distribution: with its default, these are mapped."""
+    for peer in (trio.robot, trio.node, trio.client):
+        assert "/dev/shm/fast" not in Path(f"/proc/{peer.process.pid}/maps").read_text()
+
+
 @pytest.mark.parametrize("distribution", [KILTED, JAZZY], ids=lambda one: one.name)
 def test_the_compiled_types_have_the_hashes_of_the_released_packages(distribution, request):
     folder = request.getfixturevalue("ros_folder" if distribution is KILTED else "jazzy_folder")
