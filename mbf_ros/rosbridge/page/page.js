@@ -2,6 +2,7 @@
 "use strict";
 
 const NODE = "/move_base_flex";
+const NARROW = 600; // pixels; as in page.css
 const element = (id) => document.getElementById(id);
 const canvas = element("map");
 const pen = canvas.getContext("2d");
@@ -12,7 +13,6 @@ const frames = { robot_frame: "base_link", global_frame: "map" };
 let socket = null;
 let nextId = 1;
 let goalId = null; // of the goal that this page has sent
-let drag = null;
 let drawing = false;
 
 // ---------------------------------------------------------------------------------------------------- rosbridge
@@ -47,6 +47,7 @@ function take(message) {
   if (message.op === "publish") TOPICS[message.topic]?.[1](message.msg);
   else if (message.op === "action_feedback" && message.id === goalId) takeFeedback(message.values);
   else if (message.op === "action_result" && message.id === goalId) takeResult(message);
+  else if (message.op === "service_response" && message.result === false) show("result", message.values);
   else if (message.op === "service_response" && message.id in frames) frames[message.id] = JSON.parse(message.values.value);
   else if (message.op === "status") show("result", message.msg);
   redraw();
@@ -105,6 +106,7 @@ function takeResult(message) {
   show("goal", "none");
   show("distance", "-");
   state.goal = null;
+  state.plan = []; // nobody drives it any more
 }
 
 function sendGoal(goal) {
@@ -125,8 +127,9 @@ function makeGround() { // an image of the map, with its place in metres
   else if (state.mesh && state.costs) state.ground = meshImage(state.mesh, state.costs);
   if (state.ground && !view.placed) {
     const g = state.ground;
-    Object.assign(view, { x: g.x + g.width / 2, y: g.y + g.height / 2, placed: true });
-    view.scale = 0.9 * Math.min(innerWidth / g.width, innerHeight / g.height);
+    const covered = innerWidth < NARROW ? innerHeight - element("panel").getBoundingClientRect().top : 0; // by the panel below
+    view.scale = 0.9 * Math.min(innerWidth / g.width, (innerHeight - covered) / g.height);
+    Object.assign(view, { x: g.x + g.width / 2, y: g.y + g.height / 2 - covered / 2 / view.scale, placed: true });
   }
 }
 
@@ -197,7 +200,7 @@ function draw() {
   }
   drawScan();
   drawPlan();
-  const aimed = drag?.goal ?? state.goal;
+  const aimed = aimedGoal() ?? state.goal;
   if (aimed) arrow(aimed, "#c62828", 18);
   const robot = poseOf(frames.robot_frame);
   if (robot) arrow(robot, "#1565c0", 22);
@@ -238,35 +241,7 @@ function arrow(pose, color, size) {
   pen.restore();
 }
 
-// --------------------------------------------------------------------------------------------------------- input
-canvas.addEventListener("pointerdown", (event) => {
-  canvas.setPointerCapture(event.pointerId);
-  drag = { from: [event.clientX, event.clientY], moves: event.button !== 0, at: toMetre(event.clientX, event.clientY) };
-});
-canvas.addEventListener("pointermove", (event) => {
-  if (!drag) return;
-  const [dx, dy] = [event.clientX - drag.from[0], event.clientY - drag.from[1]];
-  if (drag.moves) {
-    view.x -= dx / view.scale;
-    view.y += dy / view.scale;
-    drag.from = [event.clientX, event.clientY];
-  } else if (Math.hypot(dx, dy) > 8) drag.goal = { ...drag.at, yaw: Math.atan2(-dy, dx) };
-  redraw();
-});
-canvas.addEventListener("pointerup", () => {
-  if (drag && !drag.moves) {
-    const robot = poseOf(frames.robot_frame);
-    const ahead = robot ? Math.atan2(drag.at.y - robot.y, drag.at.x - robot.x) : 0;
-    sendGoal(drag.goal ?? { ...drag.at, yaw: ahead });
-  }
-  drag = null;
-  redraw();
-});
-canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-canvas.addEventListener("wheel", (event) => {
-  view.scale = Math.max(1, Math.min(1000, view.scale * Math.exp(-event.deltaY / 500)));
-  redraw();
-}, { passive: true });
+// ------------------------------------------------------------------------------------------------------- buttons
 element("cancel").addEventListener("click", () => send({ op: "cancel_action_goal", id: goalId, action: "/navigate_to_pose" }));
 for (const name of ["pause", "resume"]) {
   element(name).addEventListener("click", () => send({ op: "call_service", service: `${NODE}/${name}`, args: {} }));

@@ -92,6 +92,11 @@ class Page:
             button = {"button": "none"} if kind == "mouseMoved" else {"button": "left", "clickCount": 1}
             await self.command("Input.dispatchMouseEvent", type=kind, x=x, y=y, modifiers=modifiers, **button)
 
+    async def touch(self, kind, *places):
+        """Fingers at places of the window, in pixels: all that are down after a touchStart, touchMove or touchEnd."""
+        points = [{"x": x, "y": y, "id": finger} for finger, (x, y) in enumerate(places)]
+        await self.command("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+
     async def key(self, key):
         """Press and release a key, named as in JavaScript."""
         await self.key_down(key)
