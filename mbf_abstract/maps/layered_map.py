@@ -13,7 +13,8 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.maps.tracking.contact import ContactParameters, in_the_way, safe_share
+from mbf_abstract.maps.tracking.contact import in_the_way, moving_on_storey, out_of_sight, safe_share
+from mbf_abstract.maps.tracking.contact_parameters import ContactParameters
 from mbf_abstract.maps.tracking.objects import TrackedObject
 
 
@@ -109,7 +110,13 @@ class LayeredMap(NavigationMap):
             tracking = [(layer, layer.guarded_objects(now)) for layer in self.layers.enabled]
         for layer, objects in tracking:
             limits = layer.parameters
-            if not objects or not isinstance(limits, ContactParameters) or not limits.stop_before_contact:
+            if not isinstance(limits, ContactParameters) or not limits.stop_before_contact:
+                continue
+            moving = moving_on_storey(objects, pose.z, self.same_storey)
+            held = layer.lost_contact(self.robot_box, pose, moving, now)
+            if held is not None and not command.is_stopped(1e-9, 1e-9):
+                return 0.0, out_of_sight(held), limits.max_wait
+            if not objects:
                 continue
             share, touched = safe_share(self.robot_box, pose, velocity, command, objects, limits, self.same_storey)
             if touched is not None and share < least[0]:

@@ -7,13 +7,14 @@ What a layer computes depends on its map, so a map derives its own interface fro
 from __future__ import annotations
 
 from abc import ABC
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.objects import TrackedObject
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 from mbf_abstract.parameters import PluginParameters, parameter
 
 
@@ -87,6 +88,22 @@ class MapLayer(ABC):
         forgotten. An object that was first seen a moment ago may be MOVING here while it still is WAITING there.
         """
         return self.tracked_objects(now)
+
+    def lost_contact(
+        self, box: RobotBox, pose: Pose, moving: Sequence[TrackedObject], now: float
+    ) -> TrackedObject | None:
+        """Whom the robot stands for because they touched it, or nearly, and are out of sight since; None if nobody.
+
+        Parameters
+        ----------
+        box, pose
+            Outline of the robot, and where it is in the frame of the objects.
+        moving : sequence of TrackedObject
+            Those of the ``guarded_objects`` that move on its storey.
+        now : float
+            [s]
+        """
+        return None
 
     def speed_limit_at(self, pose: Pose, full_speed: float) -> float:
         """Allowed speed [m/s] of a robot at ``pose`` in the frame of the map, at most ``full_speed``; as it is here.

@@ -7,7 +7,8 @@ noticed after ``turning_time``; until then the object may be wherever it gets at
 While somebody who moves is nearer than the margin, or touches it, the robot stands.
 
 Who waits may set off, and may have done so at a speed that does not show yet. Where the robot could not stand before
-they touch it, it passes them at ``passing_speed``. It does not stop for them, as most stay where they are.
+they touch it, it passes them at ``passing_speed``. It does not stop for them, as most stay where they are. Whom it has
+lost sight of while they touched it, see ``lost_contacts.py``.
 
 Who comes from behind, hardly faster than the robot drives away, follows it: to brake would bring about the contact that
 it is to avoid. So their velocity counts for the ``turning_time`` only, until which they notice what the robot does.
@@ -23,9 +24,9 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.maps.tracking.braking import Decelerations, motions_to_standstill
+from mbf_abstract.maps.tracking.contact_parameters import ContactParameters
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.maps.tracking.robot_box import RobotBox
-from mbf_abstract.parameters import ParameterModel, parameter
 
 SHARES = (1.0, 0.75, 0.5, 0.25)
 """Shares of a command that are tried, in this order, before the robot stops."""
@@ -35,37 +36,6 @@ FOLLOWING = 0.1
 """Who follows is no faster [m/s] than the robot drives away, but for this: estimates of velocities are not exact."""
 SAME_STOREY = 1.0
 """Objects whose ground is farther above or below the robot [m] are on another storey, on a map that knows heights."""
-
-
-class ContactParameters(ParameterModel):
-    """How the robot stops before moving objects."""
-
-    stop_before_contact: bool = parameter(
-        True, "Slow down and stop in time before moving objects, whatever the controller."
-    )
-    contact_margin: float = parameter(0.1, "Distance kept to moving objects.", unit="m", ge=0.0, le=5.0)
-    reaction_time: float = parameter(0.3, "Time until the robot begins to brake.", unit="s", ge=0.0, le=5.0)
-    turning_time: float = parameter(
-        0.5,
-        "Time until the robot notices that an object has turned; until then it may be wherever it gets at its speed. "
-        "0 = objects do not turn.",
-        unit="s",
-        ge=0.0,
-        le=5.0,
-    )
-    decel_lim_x: float = parameter(0.5, "Deceleration of the robot.", unit="m/s^2", gt=0.0, le=100.0)
-    decel_lim_theta: float = parameter(1.0, "Deceleration of its turns.", unit="rad/s^2", gt=0.0, le=100.0)
-    passing_speed: float = parameter(
-        0.3,
-        "Speed at which the robot passes somebody who waits where it could not stand if they set off; slower commands "
-        "are followed as they are.",
-        unit="m/s",
-        gt=0.0,
-        le=100.0,
-    )
-    max_wait: float = parameter(
-        10.0, "The path is blocked once the robot has waited for moving objects for this long.", unit="s", ge=0.0
-    )
 
 
 def moving_on_storey(
@@ -88,6 +58,13 @@ def in_the_way(known: TrackedObject) -> str:
     if known.motion is Motion.WAITING:
         return f"object {known.number} waits beside the way, at ({known.x:.2f}, {known.y:.2f})"
     return f"object {known.number} moves in the way, at ({known.x:.2f}, {known.y:.2f})"
+
+
+def out_of_sight(known: TrackedObject) -> str:
+    """Text on an object that touched the robot, or nearly, when it was last seen."""
+    return (
+        f"object {known.number} came as near as a contact and is out of sight, last at ({known.x:.2f}, {known.y:.2f})"
+    )
 
 
 def safe_share(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -21,9 +21,11 @@ from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.layers.layer import MapLayer
 from mbf_abstract.maps.layers.source_watch import SourceWatch
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.tracking.lost_contacts import LostContacts
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.maps.tracking.prediction import NOWHERE, Prediction, PredictionParameters, predict
 from mbf_abstract.maps.tracking.rays import Rays
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 from mbf_abstract.maps.tracking.tracker import Tracker, TrackingParameters
 from mbf_abstract.parameters import parameter
 
@@ -86,11 +88,14 @@ class MovingObstacles:
     ----------
     watches : dict of str to SourceWatch
         How fresh each sensor is.
+    lost_contacts : LostContacts
+        Who touched the robot and is out of sight.
     """
 
     def __init__(self, parameters: MovingObstaclesParameters, frame_id: str) -> None:
         self._tracker = Tracker(parameters, frame_id)
         self.watches = {name: SourceWatch(name) for name in parameters.sources}
+        self.lost_contacts = LostContacts()
         self._waiting: deque[RangeScan] = deque(maxlen=MAX_WAITING)
         self._lock = threading.Lock()  # of the tracker
         self._sensor = NOWHERE  # where the last scan was taken [m]
@@ -182,6 +187,13 @@ class TrackingLayer(MapLayer):
     def guarded_objects(self, now: float) -> tuple[TrackedObject, ...]:
         """The objects before which the robot must stop: the hidden ones too, and who has just begun to move."""
         return self._objects.guarded_objects(now)
+
+    def lost_contact(
+        self, box: RobotBox, pose: Pose, moving: Sequence[TrackedObject], now: float
+    ) -> TrackedObject | None:
+        """Who came within the margin and is out of sight since, for ``lost_contact_time``."""
+        limits = self.parameters
+        return self._objects.lost_contacts.held(box, pose, moving, limits.contact_margin, limits.lost_contact_time, now)
 
 
 def _near_hits(scan: RangeScan, limits: MovingObstaclesParameters) -> NDArray[np.int64]:

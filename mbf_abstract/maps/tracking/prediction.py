@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose
-from mbf_abstract.maps.tracking.contact import ContactParameters
+from mbf_abstract.maps.tracking.contact_parameters import ContactParameters
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.parameters import parameter
 

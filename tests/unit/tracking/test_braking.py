@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.tracking.braking import Decelerations, motions_to_standstill
-from mbf_abstract.maps.tracking.contact import ContactParameters, safe_share
+from mbf_abstract.maps.tracking.contact import safe_share
+from mbf_abstract.maps.tracking.contact_parameters import ContactParameters
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.maps.tracking.robot_box import RobotBox
 

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
-from mbf_abstract.maps.tracking.contact import SHARES, ContactParameters, in_the_way, safe_share
+from mbf_abstract.maps.tracking.contact import SHARES, in_the_way, safe_share
 from mbf_abstract.maps.tracking.contact_guard import ContactGuard
+from mbf_abstract.maps.tracking.contact_parameters import ContactParameters
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.maps.tracking.robot_box import RobotBox
 from mbf_abstract.outcomes import ExePathOutcome
