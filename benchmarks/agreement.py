@@ -39,6 +39,7 @@ from typing import Any
 
 from agreement_robots import drawn_robot
 from agreement_worlds import WORLDS, World
+from seeds import seed_list
 
 from mbf_abstract.actions.manoeuvre_kept import goes_on, rest_of
 from mbf_abstract.actions.move_base_machine import NO_REPLAN_WITHIN
@@ -47,6 +48,7 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path as RobotPath
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
+from mbf_abstract.time.program_end import interruptible
 from terrain.sweeps.log import SweepLog
 
 DIST_TOLERANCE, ANGLE_TOLERANCE = 0.1, 0.25
@@ -175,7 +177,7 @@ def planners_of(backend: str, seed: int, controller: str, robots: str) -> list[s
     return [able[(seed + order) % len(able)]] if robots else able
 
 
-def run(backend: str, seeds: range, chosen: argparse.Namespace, log: SweepLog) -> Iterator[dict[str, Any]]:
+def run(backend: str, seeds: list[int], chosen: argparse.Namespace, log: SweepLog) -> Iterator[dict[str, Any]]:
     """Drive every chosen pair over all seeds, or read how it ended; one row for each drive."""
     for seed, (planner, controller) in product(seeds, pairs(backend)):
         if controller not in (chosen.controllers or [controller]):
@@ -209,7 +211,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="five worlds")
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("--seeds", default="0:40")
+    parser.add_argument("--seeds", type=seed_list, default="0:40")
     parser.add_argument("--map", choices=[*WORLDS], default=None)
     parser.add_argument("--planners", type=names, default=[])
     parser.add_argument("--controllers", type=names, default=[])
@@ -218,7 +220,7 @@ def main() -> None:
     parser.add_argument("--robots", choices=["drawn"], default="", help="a robot for each seed")
     parser.add_argument("--results", type=Path, default=None, help="file of finished drives")
     chosen = parser.parse_args()
-    seeds = range(5) if chosen.quick else range(*map(int, chosen.seeds.split(":")))
+    seeds = list(range(5)) if chosen.quick else chosen.seeds
     rows = []
     with tempfile.TemporaryDirectory() as folder, SweepLog(chosen.results or Path(folder) / "drives.jsonl") as log:
         for backend in [chosen.map] if chosen.map else ("costmap", "mesh"):
@@ -242,4 +244,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

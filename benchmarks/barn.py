@@ -28,6 +28,7 @@ from barn_world import GOAL, START, World, drive, warm_up
 from scipy.spatial import cKDTree
 
 from mbf_abstract.plugins import PlanRequest
+from mbf_abstract.time.program_end import interruptible
 from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
@@ -193,4 +194,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -34,6 +34,7 @@ from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.batch_planner import BatchPlanner
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.server.standing_server import read_config_or_map, standing_server
+from mbf_abstract.time.program_end import interruptible
 
 Ends = tuple[list[Pose], list[Pose]]
 BAR_ON_TWO = 1.8
@@ -194,4 +195,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -24,6 +24,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from mbf_abstract.time.program_end import interruptible
+
 BENCHMARKS = "core_latency,simulation_speed,mesh_layers,mesh_start,controllers,grid_speed,mesh_speed"
 BAR = 1.05
 LOWER_IS_BETTER = ("_ms", "_us", "_s", "_ms_p")  # without the digits at the end
@@ -123,4 +125,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

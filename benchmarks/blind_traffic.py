@@ -26,11 +26,12 @@ from typing import Any
 import numpy as np
 from margins import source_digest
 from PIL import Image
+from seeds import seed_list
 
+from mbf_abstract.time.program_end import interruptible
 from terrain.scenarios.scenario import Scenario, load_scenario
 from terrain.scenarios.world_types import MapWorld
 from terrain.session.runner import RunOptions, run_scenario
-from terrain.sweeps.command import parse_seeds
 from terrain.sweeps.log import rows_of
 from terrain.sweeps.sweep import hash_of
 
@@ -113,13 +114,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="two seeds of one controller")
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("--seeds", default="2000:2040", help="first and one past the last, or a list")
+    parser.add_argument("--seeds", type=seed_list, default="2000:2040", help="first and one past the last, or a list")
     parser.add_argument("--drivers", default=",".join(DRIVERS), help="map/controller, comma-separated")
     parser.add_argument("--executive", default="move_base")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--results", type=Path, help="file of finished runs")
     asked = parser.parse_args()
-    drivers, seeds = asked.drivers.split(","), parse_seeds(asked.seeds)
+    drivers, seeds = asked.drivers.split(","), asked.seeds
     if asked.quick:
         drivers, seeds = list(QUICK_DRIVERS), seeds[:2]
     if unknown := sorted(set(drivers) - set(DRIVERS)):
@@ -151,4 +152,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

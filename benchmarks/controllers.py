@@ -26,6 +26,7 @@ from mbf_abstract.maps.layers.layer_list import LayerEntry
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.plugins import ControlRequest
+from mbf_abstract.time.program_end import interruptible
 from mbf_costmap_nav.controllers.dwa import DWAController
 from mbf_costmap_nav.controllers.mppi import MPPIController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
@@ -170,4 +171,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -22,6 +22,7 @@ from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing.faulty import drive
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.program_end import interruptible
 
 WARM_UP = 500
 TARGET = Pose.planar(1.0, 0.0)
@@ -94,4 +95,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

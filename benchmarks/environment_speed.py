@@ -15,6 +15,7 @@ import gymnasium
 import numpy as np
 
 import terrain.learning.ids  # noqa: F401 - registers the names
+from mbf_abstract.time.program_end import interruptible
 from terrain.learning.environment import NavigationEnvironment
 
 STEPS, RESETS = 200, 5
@@ -65,4 +66,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

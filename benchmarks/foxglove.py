@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 from mbf_abstract.access.foxglove import FoxgloveOptions
 from mbf_abstract.access.page_access import Role
+from mbf_abstract.time.program_end import interruptible
 from terrain.scenarios.scenario import PlanarPose, Scenario, load_scenario
 from terrain.session.executives import make_executive
 from terrain.session.goal_sequence import GoalSequence
@@ -118,4 +119,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -23,6 +23,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from mbf_abstract.time.program_end import interruptible
 from mbf_costmap_nav.kernels.search.grid_line import line_cost, pull_string
 from mbf_costmap_nav.kernels.search.grid_search import FOUND, search
 from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid, pad_cells
@@ -144,4 +145,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -24,6 +24,7 @@ from types import ModuleType
 import numpy as np
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.time.program_end import interruptible
 from mbf_costmap_nav.grid.costmap import CellBox
 from mbf_costmap_nav.kernels.map.inflation import inflate
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND, search
@@ -259,4 +260,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -20,6 +20,7 @@ from terrain_meshes import add_layer, fractal_terrain
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
+from mbf_abstract.time.program_end import interruptible
 from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.map.layer import LayerContext
 from mbf_mesh_nav.map.layer_graph import LayerGraph
@@ -99,4 +100,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

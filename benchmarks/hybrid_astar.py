@@ -32,6 +32,7 @@ from numba.typed import Dict
 from mbf_abstract.compiling.decorators import kernel
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest, PlanResult
+from mbf_abstract.time.program_end import interruptible
 from mbf_costmap_nav.files.map_io import load_image, load_map
 from mbf_costmap_nav.grid.collision import footprint_costs
 from mbf_costmap_nav.grid.costmap import Costmap
@@ -258,4 +259,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -15,6 +15,7 @@ import statistics
 import time
 from contextlib import nullcontext
 
+from mbf_abstract.time.program_end import interruptible
 from terrain.scenarios.scenario import PlanarPose, Scenario, load_scenario
 from terrain.session.executives import make_executive
 from terrain.session.goal_sequence import GoalSequence
@@ -76,4 +77,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

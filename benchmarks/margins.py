@@ -23,11 +23,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from seeds import seed_list
+
+from mbf_abstract.time.program_end import interruptible
 from terrain.scenarios.library import shipped_scenarios
 from terrain.scenarios.perturbation import Perturbation
 from terrain.scenarios.scenario import Scenario, load_scenario
 from terrain.session.runner import RunOptions, run_scenario
-from terrain.sweeps.command import parse_seeds
 from terrain.sweeps.log import rows_of
 from terrain.sweeps.sweep import hash_of
 
@@ -115,12 +117,12 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--scenarios", default="", help="names, comma-separated; all that ship if not given")
     parser.add_argument("--variants", default=",".join(VARIANTS))
-    parser.add_argument("--seeds", default="0:100", help="first and one past the last seed, or a list")
+    parser.add_argument("--seeds", type=seed_list, default="0:100", help="first and one past the last seed, or a list")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--results", type=Path, help="file of finished runs")
     options = parser.parse_args()
     names = options.scenarios.split(",") if options.scenarios else list(shipped_scenarios())
-    seeds = parse_seeds(options.seeds)
+    seeds = options.seeds
     if options.quick:
         names, seeds = list(QUICK_SCENARIOS), seeds[:2]
     jobs = [(name, variant, seed) for seed in seeds for name in names for variant in options.variants.split(",")]
@@ -143,4 +145,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

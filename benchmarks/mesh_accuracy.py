@@ -30,6 +30,7 @@ from terrain_meshes import add_layer, fractal_terrain
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.plugins import PlanRequest
+from mbf_abstract.time.program_end import interruptible
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.surface_point import surface_point_at_vertex
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
@@ -205,4 +206,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

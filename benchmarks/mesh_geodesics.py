@@ -20,6 +20,7 @@ from terrain_meshes import fractal_terrain
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
+from mbf_abstract.time.program_end import interruptible
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
@@ -108,4 +109,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

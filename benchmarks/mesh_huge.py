@@ -18,6 +18,7 @@ from mesh_speed import NEVER, corner_query, plugin, scipy_graph, seconds_of
 from scipy.sparse.csgraph import dijkstra
 from terrain_meshes import Terrain, add_layer, fractal_terrain
 
+from mbf_abstract.time.program_end import interruptible
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.search.leg_search import propagate_from
@@ -83,4 +84,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

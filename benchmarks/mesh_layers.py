@@ -26,6 +26,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 from terrain_meshes import fractal_terrain
 
+from mbf_abstract.time.program_end import interruptible
 from mbf_mesh_nav.building.map_build import write_map
 from mbf_mesh_nav.files.map_header import MapHeader
 from mbf_mesh_nav.layers.tilt import TiltLayer
@@ -189,4 +190,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -23,6 +23,7 @@ from terrain_meshes import Terrain, add_layer, fractal_terrain, shuffled
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
+from mbf_abstract.time.program_end import interruptible
 from mbf_mesh_nav.layers.inflation import InflationLayer
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerContext, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph
@@ -287,4 +288,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -28,6 +28,7 @@ from terrain_meshes import fractal_terrain
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.queries import PlaceQuery
 from mbf_abstract.plugins import ControlRequest, PlanRequest
+from mbf_abstract.time.program_end import interruptible
 from mbf_mesh_nav.controllers.mppi import MPPIController
 from mbf_mesh_nav.controllers.path_follower import PathFollower
 from mbf_mesh_nav.controllers.vector_field import VectorFieldController
@@ -124,4 +125,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

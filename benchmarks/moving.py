@@ -40,7 +40,9 @@ from moving_fleets import Fleet, commands_beyond, drawn_fleet, stretched, write_
 from moving_worlds import CASES, RESOLUTION, Place
 from numpy.typing import NDArray
 from PIL import Image
+from seeds import seed_list
 
+from mbf_abstract.time.program_end import interruptible
 from terrain.recording.recording import Recording
 from terrain.recording.verdict import Verdict
 from terrain.scenarios.places import PlanarPose
@@ -48,14 +50,13 @@ from terrain.scenarios.robots import OwnRobot, Sensor
 from terrain.scenarios.scenario import Scenario
 from terrain.scenarios.world_types import HeightfieldWorld, MapWorld
 from terrain.session.runner import RunOptions, run_scenario
-from terrain.sweeps.command import parse_seeds
 
 NAMES = (
     "anna", "ben", "carla", "dora", "emil", "fritz", "greta", "hans", "ida", "jan",
     "karl", "lena", "max", "nora", "otto", "paula", "ralf", "sina", "tom", "uta",
 )  # fmt: skip
 TIME_LIMIT = 240.0  # s for each goal
-QUICK_SEEDS = "0:2"
+QUICK_SEEDS = [0, 1]
 
 MAPS, BOTH = ("costmap", "mesh", "slope"), "both"
 ROBOTS = ("equal", "drawn")
@@ -200,7 +201,7 @@ def main() -> None:
     """Run what the command line asks for and print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="two seeds of bay and crossing")
-    parser.add_argument("--seeds", default="0:10", help="first and one past the last, or a list")
+    parser.add_argument("--seeds", type=seed_list, default="0:10", help="first and one past the last, or a list")
     parser.add_argument("--cases", nargs="*", choices=list(CASES), default=list(CASES))
     parser.add_argument("--executive", nargs="*", default=["move_base", "navigation"])
     parser.add_argument("--map", choices=[*MAPS, BOTH], default=MAPS[0], help="what they drive on")
@@ -214,9 +215,9 @@ def main() -> None:
         parser.error("--map both needs --robots drawn: robots that are alike have maps of one kind")
     cases, seeds = (["bay", "crossing"], QUICK_SEEDS) if asked.quick else (asked.cases, asked.seeds)
     if asked.pairs is not None:
-        cases, seeds = ["head_on"], f"{asked.first_seed}:{asked.first_seed + asked.pairs}"
+        cases, seeds = ["head_on"], range(asked.first_seed, asked.first_seed + asked.pairs)
     known, rows = recorded(asked.json), []
-    for seed, case, executive in product(parse_seeds(seeds), cases, asked.executive):
+    for seed, case, executive in product(seeds, cases, asked.executive):
         row = known.get((asked.map, case, seed, executive, not asked.without, asked.robots))
         if row is None:
             row = run(case, seed, executive, not asked.without, asked.map, asked.robots == "drawn")
@@ -230,4 +231,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -24,6 +24,7 @@ from typing import Any
 
 from rich.console import Console
 
+from mbf_abstract.time.program_end import interruptible
 from terrain.experiments.evaluation.leaderboard import standings, terminal_table
 from terrain.experiments.evaluation.outdoor import LEVELS, SURVEYS, generated, outdoor, real
 from terrain.experiments.evaluation.protocol import Entry, Protocol, Trial
@@ -151,4 +152,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -22,6 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 from mbf_abstract.config.configuration import Config
+from mbf_abstract.time.program_end import interruptible
 from mbf_mesh_nav.map.map_parameters import MeshMapParameters
 from mbf_mesh_nav.tiles.building.build import TileSettings, build_tiles
 from mbf_mesh_nav.tiles.building.sources import HeightSource
@@ -148,4 +149,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -22,13 +22,14 @@ import moving
 import numpy as np
 import yaml
 from moving_worlds import cut, floor
+from seeds import seed_list
 
+from mbf_abstract.time.program_end import interruptible
 from terrain.scenarios.actors import OtherRobot
 from terrain.scenarios.places import PlanarPose
 from terrain.scenarios.robots import Sensor
 from terrain.scenarios.scenario import Scenario
 from terrain.session.runner import RunOptions, run_scenario
-from terrain.sweeps.command import parse_seeds
 
 CONTROLLERS = {"costmap": ("regulated_pure_pursuit", "dwa", "mppi"), "mesh": ("path_follower", "mppi")}
 EXECUTIVES = ("move_base", "navigation")
@@ -101,7 +102,7 @@ def main() -> None:
     """Run what the command line asks for and print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="one seed")
-    parser.add_argument("--seeds", default="0:5", help="first and one past the last, or a list")
+    parser.add_argument("--seeds", type=seed_list, default="0:5", help="first and one past the last, or a list")
     parser.add_argument("--maps", nargs="*", choices=tuple(CONTROLLERS), default=list(CONTROLLERS))
     parser.add_argument("--controllers", nargs="*", help="of these only")
     parser.add_argument("--executives", nargs="*", choices=EXECUTIVES, default=list(EXECUTIVES))
@@ -114,7 +115,7 @@ def main() -> None:
         if not asked.controllers or controller in asked.controllers
     ]
     rows = []
-    for seed, kind, executive in product(parse_seeds("0:1" if asked.quick else asked.seeds), kinds, asked.executives):
+    for seed, kind, executive in product([0] if asked.quick else asked.seeds, kinds, asked.executives):
         rows.append(row := run(seed, *kind, executive))
         times = f"{row['time']} s (free {row['free']}, behind {row['behind']})"
         print(f"{' '.join(kind)}, {executive}, seed {seed}: {times}; {row['verdict']}", flush=True)
@@ -132,4 +133,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

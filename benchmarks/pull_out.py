@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.pull_out import find_pull_out, paths_to_keep_free
+from mbf_abstract.time.program_end import interruptible
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_mesh_nav.map.mesh_map import MeshMap
@@ -96,4 +97,5 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -29,6 +29,8 @@ from pathlib import Path
 
 import numpy as np
 
+from mbf_abstract.time.program_end import interruptible
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
@@ -176,4 +178,5 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

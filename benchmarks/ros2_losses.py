@@ -21,6 +21,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from mbf_abstract.time.program_end import interruptible
 from tests.system.ros2.conftest import Trio
 from tests.system.ros2.environments import KILTED
 from tests.system.ros2.test_stopping_in_time import CONFIG, stop_after
@@ -63,4 +64,5 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -24,6 +24,7 @@ from mbf_abstract.server.factory import read_config
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.time.clock import WallClock, unix_seconds, wall_seconds
+from mbf_abstract.time.program_end import interruptible
 from mbf_ros.messages.geometry import MessageContext, odometry_message, pose_stamped, transforms_message
 from mbf_ros.messages.json_text import json_text
 from mbf_ros.messages.maps import occupancy_cells
@@ -406,4 +407,5 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

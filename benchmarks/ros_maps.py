@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.maps.view import GridView, MeshView
+from mbf_abstract.time.program_end import interruptible
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_ros.map_messages import Audience, GridMessages
 from mbf_ros.messages import maps
@@ -107,4 +108,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -17,6 +17,7 @@ from websockets.sync.client import connect
 from mbf_abstract.access.server_options import ServerOptions
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.time.clock import WallClock, wall_seconds
+from mbf_abstract.time.program_end import interruptible
 from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
 from terrain.session.served_world import open_world
 from terrain.session.session import Session
@@ -111,4 +112,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

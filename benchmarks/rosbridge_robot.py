@@ -24,6 +24,7 @@ from mbf_abstract.goals.goal_types import GetPathGoal, MoveBaseGoal
 from mbf_abstract.server.factory import read_config
 from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_abstract.time.clock import WallClock, wall_seconds
+from mbf_abstract.time.program_end import interruptible
 from mbf_ros.rosbridge.serving import BridgeOptions
 from mbf_ros.rosbridge_robot.navigator import connect_navigator
 from mbf_ros.rosbridge_robot.simulated_robot import serve_robot
@@ -128,4 +129,5 @@ def over_rosbridge(file: Path, seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

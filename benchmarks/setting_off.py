@@ -18,14 +18,15 @@ from typing import Any
 
 import numpy as np
 from moving_worlds import RESOLUTION, cut, floor
+from seeds import seed_list
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.time.program_end import interruptible
 from terrain.experiments.table1 import repetition
 from terrain.experiments.table1.conditions import Surroundings
 from terrain.experiments.table1.environments.warehouse_environment import WarehouseEnvironment
 from terrain.experiments.table1.main_run.conditions import CONDITIONS
 from terrain.experiments.table1.main_run.trial import NAVIGATION
-from terrain.sweeps.command import parse_seeds
 from terrain.worlds.occupancy import OccupancyGrid
 
 LENGTH, SHUTTLES, LEGS = 20.0, 5, 4
@@ -92,13 +93,13 @@ def main() -> None:
     """Run what the command line asks for and print a line for each run and each executive."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="one seed")
-    parser.add_argument("--seeds", default="0:10", help="first and one past the last, or a list")
+    parser.add_argument("--seeds", type=seed_list, default="0:10", help="first and one past the last, or a list")
     parser.add_argument("--executives", nargs="*", choices=EXECUTIVES, default=list(EXECUTIVES))
     parser.add_argument("--blind", action="store_true", help="the others stop for nobody")
     parser.add_argument("--json", type=Path, help="append one line for each run to this file")
     asked = parser.parse_args()
     rows = []
-    for seed in parse_seeds("0:1" if asked.quick else asked.seeds):
+    for seed in [0] if asked.quick else asked.seeds:
         for executive in asked.executives:
             rows.append(row := run(seed, executive, asked.blind))
             print(row, flush=True)
@@ -114,4 +115,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

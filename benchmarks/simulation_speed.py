@@ -19,6 +19,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mbf_abstract.geometry import Twist
+from mbf_abstract.time.program_end import interruptible
 from terrain.physics.kinematic_robot import KinematicRobot
 from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.protocols import SimulatedRobot, SimulatedWorld
@@ -119,4 +120,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from mbf_abstract.time.program_end import interruptible
 from mbf_mesh_nav.map.map_builder import build_mesh_map
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry, MeshMapParameters
 from mbf_mesh_nav.mesh.borders import on_surface
@@ -266,4 +267,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -25,6 +25,7 @@ from tiles import SETTINGS, SPACING, write_heights
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.time.program_end import interruptible
 from mbf_mesh_nav.map.map_parameters import MeshLayerEntry
 from mbf_mesh_nav.tiles.building.build import build_tiles
 from mbf_mesh_nav.tiles.building.sources import HeightSource, open_heights
@@ -154,4 +155,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -25,6 +25,7 @@ import numpy as np
 from mbf_abstract.geometry import Twist
 from mbf_abstract.maps.layers.layer_list import LayerEntry
 from mbf_abstract.maps.tracking.objects import TrackedObject
+from mbf_abstract.time.program_end import interruptible
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from terrain.physics.actors import PERSON_RADIUS, RouteWalker
@@ -165,4 +166,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with interruptible():
+        main()

@@ -29,3 +29,22 @@ def test_the_same_robots_drive_on_every_map_and_the_slope_rises_by_a_tenth(tmp_p
     ground = made["slope"].world.heightfield(np.random.default_rng(0), np.zeros((0, 2)))
     assert ground.height_at(12.0, 3.0) - ground.height_at(8.0, 3.0) == pytest.approx(0.4, abs=0.02)
     assert ground.height_at(10.0, 5.0) - ground.height_at(10.0, 3.0) == pytest.approx(1.0, abs=0.02), "a wall beside it"
+
+
+@pytest.mark.parametrize("text", ["a:b", "5:2", "1,1", "-3", ""])
+def test_wrong_seeds_of_a_benchmark_end_with_one_line_before_anything_is_driven(text, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["moving.py", f"--seeds={text}"])
+    with pytest.raises(SystemExit) as ended:
+        moving.main()
+    said = capsys.readouterr()
+    assert ended.value.code == 2 and not said.out
+    expected = f"--seeds: expected 0:20 or 1,5,9, each number once and none below 0, got {text!r}"
+    assert said.err.splitlines()[-1] == f"moving.py: error: argument {expected}"
+
+
+def test_every_benchmark_ends_at_ctrl_c_with_one_line():
+    scripts = [file for file in SOURCE.parent.glob("*.py") if "__main__" in file.read_text("utf-8")]
+    bare = [
+        file.name for file in scripts if "    with interruptible():\n        main()\n" not in file.read_text("utf-8")
+    ]
+    assert len(scripts) >= 40 and not bare
