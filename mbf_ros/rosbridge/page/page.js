@@ -252,4 +252,4 @@ function show(id, text) {
   element(id).textContent = text;
 }
 
-connect();
+addEventListener("DOMContentLoaded", connect); // once input.js is there, too
