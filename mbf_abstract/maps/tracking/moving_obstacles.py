@@ -21,6 +21,7 @@ from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.layers.layer import MapLayer
 from mbf_abstract.maps.layers.source_watch import SourceWatch
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.tracking.contact_parameters import ContactParameters
 from mbf_abstract.maps.tracking.lost_contacts import LostContacts
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.maps.tracking.prediction import NOWHERE, Prediction, PredictionParameters, predict
@@ -88,16 +89,14 @@ class MovingObstacles:
     ----------
     watches : dict of str to SourceWatch
         How fresh each sensor is.
-    lost_contacts : LostContacts
-        Who touched the robot and is out of sight.
     """
 
     def __init__(self, parameters: MovingObstaclesParameters, frame_id: str) -> None:
         self._tracker = Tracker(parameters, frame_id)
         self.watches = {name: SourceWatch(name) for name in parameters.sources}
-        self.lost_contacts = LostContacts()
+        self._lost_contacts = LostContacts()
         self._waiting: deque[RangeScan] = deque(maxlen=MAX_WAITING)
-        self._lock = threading.Lock()  # of the tracker
+        self._lock = threading.Lock()  # of the tracker and of who is lost
         self._sensor = NOWHERE  # where the last scan was taken [m]
 
     def insert_scan(self, scan: RangeScan) -> None:
@@ -130,6 +129,14 @@ class MovingObstacles:
         """The objects before which the robot must stop, at ``now`` [s]; see ``Tracker.objects``."""
         with self._lock:
             return self._tracker.objects(now, guarded=True)
+
+    def lost_contact(
+        self, parameters: ContactParameters, box: RobotBox, pose: Pose, moving: Sequence[TrackedObject], now: float
+    ) -> TrackedObject | None:
+        """Whom the robot stands for, as they came within the margin and are out of sight; see ``LostContacts.held``."""
+        margin, lasting = parameters.contact_margin, parameters.lost_contact_time
+        with self._lock:
+            return self._lost_contacts.held(box, pose, moving, margin, lasting, now)
 
     def predictions(
         self,
@@ -192,8 +199,7 @@ class TrackingLayer(MapLayer):
         self, box: RobotBox, pose: Pose, moving: Sequence[TrackedObject], now: float
     ) -> TrackedObject | None:
         """Who came within the margin and is out of sight since, for ``lost_contact_time``."""
-        limits = self.parameters
-        return self._objects.lost_contacts.held(box, pose, moving, limits.contact_margin, limits.lost_contact_time, now)
+        return self._objects.lost_contact(self.parameters, box, pose, moving, now)
 
 
 def _near_hits(scan: RangeScan, limits: MovingObstaclesParameters) -> NDArray[np.int64]:

@@ -4,9 +4,11 @@ import threading
 
 import numpy as np
 
+from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.kernels import filtering
 from mbf_abstract.maps.tracking.moving_obstacles import MovingObstacles, MovingObstaclesParameters
+from mbf_abstract.maps.tracking.robot_box import RobotBox
 
 PARAMETERS = MovingObstaclesParameters(sources=("lidar",))
 GIVEN = 0.5
@@ -58,3 +60,20 @@ def test_nobody_sees_objects_that_are_half_forgotten():
     tracked.clear(everywhere)
     reader.join()
     assert answers == [()]
+
+
+def test_controllers_of_two_slots_ask_for_whom_the_robot_stands_one_after_the_other():
+    tracked, waits = walker(), []
+    question = PARAMETERS, RobotBox.disc(0.3), Pose.planar(0.0, 0.0), tracked.objects(1.0), 1.0
+    reader = threading.Thread(target=lambda: tracked.lost_contact(*question))
+
+    class Asked(RobotBox):
+        def gaps(self, *arguments):
+            reader.start()
+            reader.join(GIVEN)
+            waits.append(reader.is_alive())
+            return super().gaps(*arguments)
+
+    assert tracked.lost_contact(PARAMETERS, Asked.disc(0.3), *question[2:]) is None
+    reader.join()
+    assert waits == [True]
